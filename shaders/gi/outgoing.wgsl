@@ -2,7 +2,7 @@
 //#import lib/octahedral.wgsl
 //#import lib/brdf.wgsl
 
-// What both stages of gi/glossy read (group 0), and the light that a pixel's surface sends out.
+// What both stages of specular light on the screen read (group 0), and the light that a pixel's surface sends out.
 
 @group(0) @binding(0) var<uniform> frame: Frame;
 // Depth binds as unfilterable float: GLSL has no plain load from a depth texture, so the GL

@@ -2,7 +2,7 @@
 //#import lib/bump.wgsl
 
 // The vertex stage of everything that draws surfaces with their materials: gbuffer.wgsl and
-// atlas.wgsl.
+// blended.wgsl.
 
 struct Vertex {
     @location(0) position: vec3f,

@@ -2,7 +2,7 @@
 
 // Temporal anti-aliasing: each frame samples its pixels somewhere else; the 3x3 samples around a
 // pixel's centre, weighted by the pixel filter, are this frame's value, and the mean over frames is
-// the filtered picture. A still camera before objects that are still averages without end. Where
+// the filtered picture. A still camera before objects that are still averages for 2,000 frames. Where
 // either moves, the mean is fetched from where the surface was, dropped where the surface was
 // hidden, and held within what the pixel's neighbourhood shows now.
 

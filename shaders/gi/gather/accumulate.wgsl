@@ -158,6 +158,11 @@ fn accumulate(@builtin(global_invocation_id) id: vec3u) {
     var share = max(max(ramp_weight(max(history_length - more, 1.0), more), early), ramp_weight(most, 0.0));
     if (gather.flags & GATHER_PROGRESSIVE) != 0u { share = 1.0 / history_length; }
     if disoccluded { share = 1.0; }
+    // A frame of one ray after frames of SPP_SHORT.
+    if spp == 1u && !disoccluded && (gather.flags & GATHER_PROGRESSIVE) == 0u {
+        let in_short = min(SHORT_HISTORY_FRAMES / max(history.history_length, 1.0), 1.0);
+        share /= 1.0 + in_short * (f32(SPP_SHORT) - 1.0);
+    }
     if spp == 0u { share = 0.0; }
     let surface = textureLoad(specular_map, pixel, 0);
     let roughness = select(NO_LOBE, surface.a, any(surface.rgb > vec3f(0.0)));

@@ -5,8 +5,8 @@
 //#import gi/gather/jobs.wgsl
 //#import gi/gather/path.wgsl
 
-// Cache update: one ray an entry, whose result is blended into the entry. Entries at its hit are
-// read from the last update, so the order of threads does not matter.
+// Cache update: one ray an entry that is due, whose result is blended into the entry. Entries at its
+// hit are read from the last update, so the order of threads does not matter.
 
 // E/π and rays in it; two halves, for even and odd updates.
 @group(2) @binding(3) var<storage, read_write> entry_light: array<vec4f>;

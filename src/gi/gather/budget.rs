@@ -5,7 +5,7 @@ use super::schedule::Frame;
 
 /// Frames after a first one in which a share of the rays is no limit: until histories are no longer
 /// short (`SHORT_HISTORY_FRAMES`: a first frame counts for eight).
-const YOUNG_FRAMES: u32 = 32;
+const FRAMES_UNLIMITED: u32 = 32;
 /// Rays a frame of a cell that rests: `REST_LEVEL` of `ray_budget.wgsl`.
 const REST: f32 = 0.25;
 
@@ -22,7 +22,7 @@ pub(super) fn rays(options: &Options, frame: &Frame, cells: u32) -> u32 {
     if options.rays > 1.0 {
         return options.rays as u32;
     }
-    if frame.number <= YOUNG_FRAMES {
+    if frame.number <= FRAMES_UNLIMITED {
         return 0;
     }
     let asked = if frame.rest { REST } else { 1.0 };
