@@ -213,7 +213,7 @@ fn method(ui: &mut Ui, state: &mut State, memory: &mut Memory, facts: &Facts<'_>
     }
 }
 
-const RAYS: &str = "Rays that a frame sends of those that its cells ask for, of methods that trace rays. Few: faster frames, but \
+const RAYS: &str = "Share of one ray for each 4×4 pixels that a frame sends, of methods that trace rays. Few: faster frames, but \
     noise, and light that follows changes slowly. The first 16 frames of a view always send all, and a view at rest \
     sends a fourth by itself.";
 
