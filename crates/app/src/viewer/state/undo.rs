@@ -167,14 +167,16 @@ mod tests {
         (0..3).for_each(|i| state.apply(Action::Rays(0.5 / f32::from(1u8 << i))));
         state.apply(Action::Reset);
         assert_eq!((state.settings.rays, state.history.len()), (1.0, [5, 0]));
-        state.apply(Action::Undo);
-        let version = state.version;
-        assert_eq!(state.settings.rays, 0.125);
-        state.apply(Action::Undo);
-        assert_eq!(state.settings.rays, 1.0);
-        state.apply(Action::Redo);
-        state.apply(Action::Undo);
+        for rays in [0.125, 1.0] {
+            state.apply(Action::Undo);
+            assert_eq!(state.settings.rays, rays);
+        }
         assert_eq!(state.history.len(), [3, 2]);
+        // Alone, they leave the scene as it is.
+        let version = state.version;
+        state.apply(Action::Rays(0.25));
+        state.apply(Action::Undo);
+        assert_eq!((state.settings.rays, state.version, state.history.len()), (1.0, version, [3, 1]));
         // A new change makes an end to what was taken back.
         state.apply(Action::Undo);
         state.apply(Action::Sky(0.1));
