@@ -155,6 +155,14 @@ impl Renderer {
         self.backdrop = backdrop;
     }
 
+    /// Sets [`Options::rays`](gi::gather::Options::rays) from the next frame on, where the method is `gather`
+    /// or `neural`.
+    pub fn set_rays(&mut self, rays: f32) {
+        if let Some(indirect) = &mut self.indirect {
+            indirect.set_rays(rays);
+        }
+    }
+
     /// The next frame has nothing to do with the last (a cut): no object has moved since, and
     /// temporal anti-aliasing starts anew.
     pub fn reset_history(&mut self) {

@@ -294,6 +294,10 @@ impl Technique for GatherGi {
         Some(Memory { histories, pixels: self.cells.pixels(), light: cell_light, changes, jobs })
     }
 
+    fn set_rays(&mut self, rays: f32) {
+        self.options.rays = rays;
+    }
+
     fn uses_rays(&self, rays: bool) -> bool {
         rays
     }

@@ -85,6 +85,10 @@ pub trait Technique: Send {
     /// The next frame has nothing to do with the last (a camera cut): histories are dropped.
     fn reset_history(&mut self) {}
 
+    /// Sets [`Options::rays`](crate::gi::gather::Options::rays) from the next frame on, for methods that
+    /// gather: histories stay.
+    fn set_rays(&mut self, _rays: f32) {}
+
     /// Frames since the last cut, for methods whose answer settles over frames.
     fn settled(&self) -> Option<u32> {
         None

@@ -126,6 +126,12 @@ impl Technique for WithFallback {
         }
     }
 
+    fn set_rays(&mut self, rays: f32) {
+        if let Ok(above) = &mut self.above {
+            above.set_rays(rays);
+        }
+    }
+
     fn settled(&self) -> Option<u32> {
         self.drew()?.settled()
     }

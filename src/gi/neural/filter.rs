@@ -175,6 +175,10 @@ impl Technique for FilterGi {
         self.gather.reset_history();
     }
 
+    fn set_rays(&mut self, rays: f32) {
+        self.gather.set_rays(rays);
+    }
+
     fn settled(&self) -> Option<u32> {
         self.gather.settled()
     }

@@ -50,8 +50,14 @@ pub fn words(state: &State, output: &str) -> Vec<String> {
     if let (true, Some(weights)) = (s.left.needs_weights(), &s.weights) {
         flag("weights", weights.display().to_string());
     }
-    if let (Source::Gather, Some(numbers)) = (s.left, &state.gather) {
-        flag("gather", numbers.clone());
+    if s.left.gathers() {
+        // As `jobs::method` makes it: a network has its own.
+        let fitted = state.gather.clone().filter(|_| s.left == Source::Gather);
+        let rays = (s.rays != 1.0).then(|| format!("rays={}", s.rays));
+        let words: Vec<String> = fitted.into_iter().chain(rays).collect();
+        if !words.is_empty() {
+            flag("gather", words.join(","));
+        }
     }
     if let (true, Some(numbers)) = (s.left.has_ambient_term(), &state.ambient_term) {
         flag("ambient-term", numbers.clone());
@@ -136,8 +142,14 @@ mod tests {
             assert!(text.contains(word), "{word} is missing in {text}");
         }
         (state.settings.left, state.gather) = (Source::Gather, Some("entry_scale=0.25".into()));
-        assert!(line(&state, None).contains("--gather=entry_scale=0.25"));
+        assert!(line(&state, None).contains("--gather=entry_scale=0.25 "));
+        state.apply(Action::Rays(0.5));
+        assert!(line(&state, None).contains("--gather=entry_scale=0.25,rays=0.5 "));
+        state.settings.left = Source::Neural;
+        assert!(line(&state, None).contains("--gather=rays=0.5 "), "a network takes rays and nothing that was fitted");
         state.apply(Action::Reset);
+        state.settings.left = Source::Gather;
+        assert!(!line(&state, None).contains("rays="));
         assert!(!line(&state, None).contains("--object"));
         state.settings.left = Source::Reference;
         let text = line(&state, None);

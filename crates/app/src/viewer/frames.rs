@@ -120,6 +120,8 @@ pub struct Run {
     pub method: String,
     pub scene: String,
     pub size: [u32; 2],
+    /// Rays that were asked for, as `gather::Options::rays` has them; 1 without any.
+    pub rays: f32,
 }
 
 /// Numbers of one run.
@@ -136,6 +138,8 @@ pub struct Numbers {
     pub wall: Track,
     /// From one frame to the next, while frames follow each other.
     pub interval: Track,
+    /// Rays that a frame has sent lately, those of both sides; none by methods without any.
+    pub rays: Option<u64>,
 }
 
 /// All that is measured.
@@ -245,7 +249,7 @@ mod tests {
     }
 
     fn run(method: &str) -> Run {
-        Run { method: method.into(), scene: "cornell".into(), size: [4, 4] }
+        Run { method: method.into(), scene: "cornell".into(), size: [4, 4], rays: 1.0 }
     }
 
     #[test]

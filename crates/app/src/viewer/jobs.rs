@@ -210,14 +210,14 @@ pub struct Network {
     /// How they store their numbers; `None`: each as it is best.
     pub precision: Option<Precision>,
     pub tuned: Arc<Tuned>,
-    /// Numbers of `gather` that were fitted to the scene.
+    /// Numbers of `gather` that were fitted to the scene, but for `rays`.
     pub gather: gather::Options,
     /// The ambient term that was.
     pub ambient_term: AmbientTerm,
 }
 
 /// The method behind a source; reads weights.
-fn method(source: Source, weights: Option<&Path>, network: &Network) -> Result<Method, String> {
+fn method(source: Source, weights: Option<&Path>, network: &Network, rays: f32) -> Result<Method, String> {
     let with = || {
         let weights = Weights::find(weights).map_err(|e| e.to_string())?;
         let neural = Neural::from(weights).stored(network.precision);
@@ -225,9 +225,12 @@ fn method(source: Source, weights: Option<&Path>, network: &Network) -> Result<M
     };
     // Beside the reference, direct light fills the G-buffer.
     let mut method = source.method(with)?.unwrap_or(Method::Direct);
-    // Fitted without a network.
-    if let (false, Some(options)) = (source.needs_weights(), method.gather_mut()) {
-        *options = network.gather;
+    if let Some(options) = method.gather_mut() {
+        // Fitted without a network.
+        if !source.needs_weights() {
+            *options = network.gather;
+        }
+        options.rays = rays;
     }
     if let Some(term) = method.ambient_term_mut() {
         *term = network.ambient_term;
@@ -246,7 +249,8 @@ pub struct Plan {
 
 /// Builds a renderer. Shaders or weights that the driver refuses are an error, not the end.
 pub fn renderer(handles: &Handles, plan: Plan, progress: &Progress) -> Result<Product, String> {
-    let method = method(plan.key.0, plan.weights.as_deref(), &plan.network)?;
+    // How many rays there are the stage tells it, frame by frame.
+    let method = method(plan.key.0, plan.weights.as_deref(), &plan.network, 1.0)?;
     progress.stage(&format!("building {}", plan.key.0.name()));
     let rays = method.needs_rays();
     let scope = handles.device.push_error_scope(wgpu::ErrorFilter::Validation);
@@ -270,6 +274,7 @@ pub struct Shot {
     pub textures: TextureMemory,
     pub size: [u32; 2],
     pub samples: u32,
+    pub rays: f32,
     pub backdrop: Backdrop,
     pub ev: f32,
     pub tonemap: bouncelight::render::tonemap_curve::Tonemap,
@@ -295,6 +300,7 @@ impl Shot {
             textures: state.textures,
             size: state.size,
             samples: if s.left == Source::Reference { s.spp } else { s.samples },
+            rays: s.rays,
             backdrop: s.backdrop,
             ev: state.stops(),
             tonemap: s.tonemap,
@@ -315,7 +321,7 @@ pub fn capture(gpu: &bouncelight::gpu::Gpu, shot: &Shot, progress: &Progress) ->
         let Some(traced) = trace(gpu, shot, progress)? else { return cancelled() };
         traced
     } else {
-        let method = method(shot.source, shot.weights.as_deref(), &shot.network)?;
+        let method = method(shot.source, shot.weights.as_deref(), &shot.network, shot.rays)?;
         let mut scene =
             SceneGpu::with_textures(&gpu.device, &gpu.queue, &shot.scene, shot.textures).map_err(|e| e.to_string())?;
         if method.needs_rays() {

@@ -74,7 +74,7 @@ pub const BINDINGS: &[Binding] = &[
     bind(Key::End, With::Nothing, "selected object to the floor", |_| Action::Floor),
     bind(Key::Z, With::Ctrl, "undo", |_| Action::Undo),
     bind(Key::Y, With::Ctrl, "redo (or Ctrl + Shift + Z)", |_| Action::Redo),
-    bind(Key::U, With::Nothing, "reset lights and objects", |_| Action::Reset),
+    bind(Key::U, With::Nothing, "reset lights, objects and rays", |_| Action::Reset),
     bind(Key::F5, With::Nothing, "load the scene again", |_| Action::Reload),
     bind(Key::F12, With::Nothing, "capture PNG", |_| Action::Capture { exr: false }),
     bind(Key::F12, With::Shift, "capture EXR with layers", |_| Action::Capture { exr: true }),

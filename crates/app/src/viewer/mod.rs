@@ -26,6 +26,7 @@ mod layouts;
 mod live;
 mod navigate;
 mod pick;
+mod rays;
 mod records;
 #[cfg(feature = "script")]
 mod report;

@@ -1,6 +1,7 @@
 //! Times as text: a table to paste, and files for a spreadsheet.
 
 use super::frames::{Group, Numbers, Times};
+use super::rays;
 use super::stats::Spread;
 use std::fmt::Write as _;
 
@@ -52,10 +53,14 @@ fn lines(numbers: &Numbers) -> Vec<Line<'_>> {
 /// A Markdown table with what it is of above.
 pub fn table(times: &Times, about: &About) -> String {
     let [w, h] = times.run.size;
+    let rays = times.now.rays.map_or(String::new(), |n| {
+        format!(" · {} rays a frame ({})", rays::count(n as f64), rays::share(times.run.rays))
+    });
     let mut text = format!(
-        "{} · {} · {w}×{h}\n{} ({}, {}){}\n\n| | median ms | p95 ms | share | frames |\n|---|---|---|---|---|\n",
+        "{} · {} · {w}×{h}{}\n{} ({}, {}){}\n\n| | median ms | p95 ms | share | frames |\n|---|---|---|---|---|\n",
         times.run.method,
         times.run.scene,
+        rays,
         about.adapter,
         about.backend,
         about.driver,
@@ -78,16 +83,21 @@ fn field(text: &str) -> String {
 /// Passes with what they were measured on in every row, so that files can be joined.
 pub fn passes_csv(times: &Times, about: &About) -> String {
     let mut text = "adapter,backend,driver,software,scene,method,width,height,group,pass,median_ms,p95_ms,mean_ms,\
-        share,frames\n"
+        share,frames,rays,ray_share\n"
         .to_string();
     let [w, h] = times.run.size;
     let words = [&about.adapter, &about.backend, &about.driver].map(|t| field(t)).join(",");
     let of = format!("{words},{},{},{},{w},{h}", about.software, field(&times.run.scene), field(&times.run.method));
+    // A count is no share.
+    let rays = times.now.rays.map_or(",".into(), |n| {
+        let share = if times.run.rays > 1.0 { String::new() } else { times.run.rays.to_string() };
+        format!("{n},{share}")
+    });
     for Line { group, pass, spread, share } in lines(&times.now) {
         let number = |v: Option<f64>| v.map_or(String::new(), |v| format!("{v:.4}"));
         let Spread { median, p95, mean, count } = spread;
         let (group, pass, p95, share) = (field(group), field(pass), number(p95), number(share));
-        let _ = writeln!(text, "{of},{group},{pass},{median:.4},{p95},{mean:.4},{share},{count}");
+        let _ = writeln!(text, "{of},{group},{pass},{median:.4},{p95},{mean:.4},{share},{count},{rays}");
     }
     text
 }
@@ -121,20 +131,24 @@ mod tests {
     #[test]
     fn records_name_what_they_are_of_and_add_up() {
         let mut times = Times::default();
-        times.begin(Run { method: "SSGI".into(), scene: "a, b.glb".into(), size: [640, 360] });
+        times.begin(Run { method: "SSGI".into(), scene: "a, b.glb".into(), size: [640, 360], rays: 0.5 });
         let run = times.run.clone();
         for _ in 0..20 {
             let passes = [("gbuffer", 1.0), ("gi.ssgi", 3.0), ("viewer.show", 9.0)].map(|(l, ms)| (l.to_string(), ms));
             times.frame(Instant::now(), &passes, 0.5, &run);
         }
         let about = About { adapter: "A \"7\"".into(), backend: "vulkan".into(), driver: "d".into(), software: true };
+        assert!(!table(&times, &about).contains("rays"), "nobody has counted any");
+        times.now.rays = Some(41_234);
         let table = table(&times, &about);
+        assert!(table.contains("a, b.glb · 640×360 · 41 k rays a frame (1/2)\n"), "{table}");
         assert!(table.contains("640×360") && table.contains("not representative"), "{table}");
         assert!(table.contains("| **GPU** | 4.000 | 4.000 |  | 20 |"), "{table}");
         assert!(table.contains("| gi.ssgi | 3.000 | 3.000 | 75.0 % | 20 |"), "{table}");
         let csv = passes_csv(&times, &about);
         let rows: Vec<&str> = csv.lines().collect();
         assert!(rows[1].starts_with("\"A \"\"7\"\"\",vulkan,d,true,\"a, b.glb\",SSGI,640,360,GPU,,4.0000"), "{csv}");
+        assert!(rows[0].ends_with(",frames,rays,ray_share") && rows[1].ends_with(",20,41234,0.5"), "{csv}");
         // Every row has as many fields as the head, quoted commas apart.
         assert!(rows.iter().skip(1).all(|r| r.matches(',').count() == rows[0].matches(',').count() + 1), "{csv}");
         let frames = frames_csv(&times);

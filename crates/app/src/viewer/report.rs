@@ -40,7 +40,7 @@ pub fn report(app: &App) -> Value {
         "view": s.view.name(), "left": s.left.name(), "right": s.right.name(), "split": s.split, "line": s.line,
         "fallback": by(Side::Left).and_then(|by| Some(format!("{}: {}", by.source.name(), by.why?))),
         "drawn": { "left": key(Side::Left), "right": key(Side::Right) },
-        "backdrop": s.backdrop.name(), "coarse": app.state.is_coarse(), "exposure": app.state.stops(), "auto_exposure": app.state.auto_exposure, "tonemap": s.tonemap.name(), "samples": s.samples,
+        "backdrop": s.backdrop.name(), "coarse": app.state.is_coarse(), "exposure": app.state.stops(), "auto_exposure": app.state.auto_exposure, "tonemap": s.tonemap.name(), "samples": s.samples, "rays": s.rays,
         "still": stage.map_or(0, |st| st.still()),
         "full_screen": app.state.full_screen, "panel": s.panel, "help": app.state.help, "dark": s.dark, "zoom": s.zoom, "measure": app.state.measure,
         "feature": stage.and_then(|st| st.feature()).map(|f| f.0.to_string()),
@@ -72,7 +72,7 @@ pub fn report(app: &App) -> Value {
         "timing": {
             "shown": timing.shown, "expanded": timing.expanded, "at": timing.at, "unfolded": timing.unfolded,
             "history": history.len(), "runs": changes + usize::from(!history.is_empty()), "count": count,
-            "method": times.run.method,
+            "method": times.run.method, "rays": times.now.rays,
         },
         "touring": app.touring().is_some(), "resident": app.meter.resident, "greeted": s.greeted,
         "undo": app.state.history.len(), "panel_width": s.panel_width,

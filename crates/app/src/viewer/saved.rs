@@ -1,6 +1,7 @@
 //! What is remembered from one day to the next. Scripted runs neither read nor write it.
 
 use super::choice::{Source, View};
+use super::rays;
 use bouncelight::render::{Backdrop, tonemap_curve::Tonemap};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
@@ -28,6 +29,8 @@ pub struct Settings {
     pub tonemap: Tonemap,
     /// Frames that are averaged while nothing moves.
     pub samples: u32,
+    /// Rays a frame of methods that gather, as `gather::Options::rays` has them.
+    pub rays: f32,
     /// What is seen beyond the scene.
     pub backdrop: Backdrop,
     /// Half the resolution while the view moves, where frames are slow.
@@ -68,6 +71,7 @@ impl Default for Settings {
             exposure: 0.0,
             tonemap: Tonemap::Filmic,
             samples: 16,
+            rays: 1.0,
             backdrop: Backdrop::Shown,
             coarse: true,
             spp: 256,
@@ -136,6 +140,7 @@ impl Settings {
         self.zoom = within(self.zoom, 0.5, 4.0, 1.0);
         self.panel_width = within(self.panel_width, 200.0, 800.0, 300.0);
         self.timing.at = self.timing.at.map(|v| within(v, -16_384.0, 16_384.0, 8.0));
+        self.rays = rays::checked(self.rays);
         self.samples = self.samples.clamp(1, 4096);
         self.spp = self.spp.clamp(1, 1 << 20);
         self.window = self.window.map(|n| n.clamp(160, 16_384));
@@ -196,7 +201,7 @@ mod tests {
         let path = dir.path().join("deep").join("view.json");
         assert_eq!(Settings::load(&path), Ok(None));
         let mut settings =
-            Settings { tonemap: Tonemap::Agx, left: Source::Neural, exposure: -1.5, ..Settings::default() };
+            Settings { tonemap: Tonemap::Agx, left: Source::Neural, exposure: -1.5, rays: 0.25, ..Settings::default() };
         for i in 0..12 {
             settings.remember(&format!("{i}.glb"));
         }
@@ -218,8 +223,9 @@ mod tests {
             let error = Settings::load(&path).unwrap_err();
             assert!(error.contains("view.json"), "{error}");
         }
-        std::fs::write(&path, "{\"line\":7,\"samples\":0,\"window\":[0,99999],\"later\":1}").unwrap();
+        std::fs::write(&path, "{\"line\":7,\"samples\":0,\"rays\":-3,\"window\":[0,99999],\"later\":1}").unwrap();
         let settings = Settings::load(&path).unwrap().unwrap();
-        assert_eq!((settings.line, settings.samples, settings.window), (1.0, 1, [160, 16_384]));
+        let Settings { line, samples, rays, window, .. } = settings;
+        assert_eq!((line, samples, rays, window), (1.0, 1, 1.0, [160, 16_384]));
     }
 }

@@ -3,6 +3,7 @@
 
 #![recursion_limit = "512"]
 
+mod budget;
 #[path = "../../../../tests/common/mod.rs"]
 mod common;
 mod display;

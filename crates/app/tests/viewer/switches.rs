@@ -69,7 +69,7 @@ fn methods_weights_and_views_switch_at_run_time() {
         { "drop": other(dir.path()) }, { "wait": "idle" }, { "expect": { "/weights": { "contains": "one_layer" } } },
         { "expect_not_saved": { "passes": "/passes" } }
     ]);
-    let out = session(&display, dir.path(), script, &["cornell", "--method", "ambient", "--size", "640x620"]);
+    let out = session(&display, dir.path(), script, &["cornell", "--method", "ambient", "--size", "640x650"]);
     succeeds(&out);
     let ground = |name: &str| mean(&dir.path().join(name), 345..355, 500..520);
     assert!(ground("light.png")[0] > 200.0 && ground("frontier.png")[0] < 60.0, "{:?}", ground("light.png"));

@@ -164,6 +164,7 @@ impl App {
         }
         self.meter.times.overlay.add(Instant::now(), overlay.as_secs_f64() * 1e3);
         self.collect_times();
+        self.count_rays();
         self.tour();
         self.schedule(drawn);
     }

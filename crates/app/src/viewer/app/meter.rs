@@ -54,6 +54,10 @@ pub struct Meter {
     pub flicker: Option<f64>,
     /// When the last frame of the scene was drawn, if the next was to follow at once.
     last: Option<Instant>,
+    /// What the frame was drawn with whose rays are being counted.
+    counting: Option<Arc<Run>>,
+    /// How many frames and layouts there had been when rays were counted last.
+    counted: [u64; 2],
 }
 
 impl Meter {
@@ -66,11 +70,17 @@ impl Meter {
     /// Nothing that is on its way will arrive.
     pub fn lose(&mut self) {
         self.pending.clear();
+        self.counting = None;
     }
 
-    /// True while GPU times are on their way.
+    /// True while GPU times or the number of rays are on their way.
     pub fn waits(&self) -> bool {
-        !self.pending.is_empty()
+        !self.pending.is_empty() || self.counts()
+    }
+
+    /// True while the number of rays is on its way.
+    pub fn counts(&self) -> bool {
+        self.counting.is_some()
     }
 
     /// A frame was submitted with timestamps.
@@ -113,7 +123,8 @@ impl App {
             sides.iter().filter_map(|side| stage.drawn_by(&self.state, *side)).map(|by| self.state.title(by.source));
         let method = names.collect::<Vec<_>>().join(" | ");
         let size = stage.drawn_size(&self.state);
-        self.meter.times.begin(Run { method, scene: shown.spec.clone(), size });
+        let rays = if stage.has_cells() { self.state.settings.rays } else { 1.0 };
+        self.meter.times.begin(Run { method, scene: shown.spec.clone(), size, rays });
     }
 
     /// Takes in the GPU times that have arrived.
@@ -134,6 +145,27 @@ impl App {
         if any {
             self.learn();
             self.overlay.outdate();
+        }
+    }
+
+    /// Takes in how many rays a frame has sent, and asks it of the last one: once for each layout of the overlay
+    /// that tells it.
+    pub fn count_rays(&mut self) {
+        let Some(stage) = &mut self.stage else { return };
+        if let Some(run) = &self.meter.counting {
+            let _ = stage.gpu.device.poll(wgpu::PollType::Poll);
+            let Some(count) = stage.counted_rays() else { return };
+            if Arc::ptr_eq(run, &self.meter.times.run) {
+                self.meter.times.now.rays = count;
+                self.overlay.outdate();
+            }
+            self.meter.counting = None;
+        }
+        let [frames, layouts] = self.meter.counted;
+        let due = frames != self.scene_frames && layouts != self.overlay.layouts;
+        if due && self.state.settings.timing.shown && stage.count_rays() {
+            self.meter.counted = [self.scene_frames, self.overlay.layouts];
+            self.meter.counting = Some(self.meter.times.run.clone());
         }
     }
 

@@ -221,6 +221,7 @@ impl App {
             || self.redraw
             || self.again
             || self.overlay.is_stale()
+            || self.meter.counts()
             || self.requested
             || !self.jobs.is_empty())
     }
@@ -314,6 +315,7 @@ impl ApplicationHandler<Event> for App {
             self.redraw = true;
         }
         self.collect_times();
+        self.count_rays();
         let due = |at: Option<Instant>| at.is_some_and(|at| at <= now);
         self.again |= due(self.tracing.judge_at);
         // Where frames are drawn anyway, they decide themselves when numbers are due.

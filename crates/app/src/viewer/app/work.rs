@@ -232,7 +232,12 @@ impl App {
             }
             found => found.and_then(Result::ok),
         };
-        let gather = fitted.as_deref().and_then(Fitted::gather);
+        let mut gather = fitted.as_deref().and_then(Fitted::gather);
+        if let Some(options) = &mut gather {
+            // A hand's choice stands where nothing was fitted.
+            let rays = std::mem::replace(&mut options.rays, 1.0);
+            self.state.settings.rays = if rays == 1.0 { self.state.settings.rays } else { rays };
+        }
         let ambient_term = fitted.as_deref().and_then(Fitted::ambient_term);
         let now = (gather.unwrap_or_default(), ambient_term.unwrap_or_default());
         if now != (self.network.gather, self.network.ambient_term) {

@@ -3,6 +3,7 @@
 
 mod drawn;
 mod feature;
+mod ray_count;
 mod sides;
 
 use super::choice::{Side, View};
@@ -20,6 +21,7 @@ use bouncelight::render::{Backdrop, DrawnCount, Purpose, RenderError, Renderer, 
 use bouncelight::scene::{Camera, Scene};
 pub use drawn::DrawnBy;
 use feature::Feature;
+use ray_count::RayCount;
 use sides::Reference;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -43,6 +45,7 @@ struct Sight {
     size: [u32; 2],
     keys: [Option<Key>; 2],
     samples: u32,
+    rays: f32,
     backdrop: Backdrop,
     texel: u32,
     moving: bool,
@@ -57,6 +60,7 @@ pub struct Stage {
     show: ShowPass,
     sum: SumPass,
     flicker: FlickerPass,
+    ray_count: RayCount,
     /// `None` where the device has no lines.
     wires: Option<WiresPass>,
     /// What the last frame was seen with, until its edges are drawn.
@@ -83,6 +87,7 @@ impl Stage {
         let show = ShowPass::new(&gpu.device, format);
         let sum = SumPass::new(&gpu.device, &gpu.queue);
         let flicker = FlickerPass::new(&gpu.device);
+        let ray_count = RayCount::new(&gpu.device);
         let wires = WiresPass::new(&gpu.device);
         Self {
             gpu,
@@ -92,6 +97,7 @@ impl Stage {
             show,
             sum,
             flicker,
+            ray_count,
             wires,
             unwired: None,
             reference: None,
@@ -240,6 +246,7 @@ impl Stage {
             size: state.size,
             keys: [self.key(0), self.key(1)],
             samples: state.settings.samples,
+            rays: state.settings.rays,
             backdrop: state.settings.backdrop,
             texel,
             moving,
@@ -262,6 +269,7 @@ impl Stage {
         for slot in self.slots.iter_mut().flatten() {
             slot.renderer.resize(size)?;
             slot.renderer.set_backdrop(state.settings.backdrop);
+            slot.renderer.set_rays(state.settings.rays);
             // Frame by frame as a capture draws them.
             let samples = if moving { 1 } else { state.settings.samples };
             let (number, offset) = match settling.checked_sub(self.still) {

@@ -28,6 +28,8 @@ pub enum Action {
     AutoExposure,
     Tonemap(Option<Tonemap>),
     Samples(u32),
+    /// Rays a frame, as `gather::Options::rays` has them.
+    Rays(f32),
     Help,
     Panel,
     Measure,
@@ -73,7 +75,7 @@ pub enum Action {
     Move(Vec3),
     /// Sets the selected object down on what lies below it.
     Floor,
-    /// Lights, objects and surroundings as the file has them.
+    /// Lights, objects and surroundings as the file has them, and all rays.
     Reset,
     Undo,
     Redo,

@@ -240,9 +240,10 @@ impl State {
         self.version += 1;
     }
 
-    /// Lights, objects and surroundings as the file has them.
+    /// Lights, objects and surroundings as the file has them, and all rays.
     pub(super) fn reset(&mut self) {
         let Some(shown) = &mut self.shown else { return };
+        self.settings.rays = 1.0;
         if shown.variant.take().is_some() {
             self.requests.push(Request::Upload);
         }

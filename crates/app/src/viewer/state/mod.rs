@@ -12,6 +12,7 @@ mod undo;
 use super::choice::{Side, Source, View};
 use super::film::Film;
 use super::navigate::{Navigator, Preset};
+use super::rays;
 use super::saved::Settings;
 pub use action::{Action, Request};
 use bouncelight::gpu_scene::TextureMemory;
@@ -104,7 +105,8 @@ pub struct State {
     pub textures: TextureMemory,
     /// Unit of length and vertical of scene files.
     pub units: Units,
-    /// Numbers of `gather` that were fitted to the scene, where they are not its own.
+    /// Numbers of `gather` that were fitted to the scene, where they are not its own; without `rays`, which
+    /// is a setting.
     pub gather: Option<String>,
     /// The ambient term that was.
     pub ambient_term: Option<String>,
@@ -307,6 +309,7 @@ impl State {
                 self.settings.tonemap = kind.unwrap_or(Tonemap::ALL[next]);
             }
             A::Samples(n) => self.settings.samples = n.clamp(1, 4096),
+            A::Rays(rays) => self.settings.rays = rays::checked(rays),
             A::Help => self.help = !self.help,
             A::Panel => self.settings.panel = !self.settings.panel,
             A::Measure => self.measure = !self.measure,

@@ -1,5 +1,5 @@
-//! Undo and redo of what hands change in the scene: lights, objects, surroundings. What is kept is
-//! small: meshes and textures do not change.
+//! Undo and redo of what hands change in the scene: lights, objects, surroundings; and of how many rays light
+//! it. What is kept is small: meshes and textures do not change.
 
 use super::{Action, Stale, State};
 use bouncelight::scene::{Environment, Light};
@@ -24,6 +24,9 @@ struct Step {
     sky: Option<(Environment, f32)>,
     added: usize,
     sky_added: bool,
+    rays: f32,
+    /// Of the scene, which is the same while this is.
+    version: u64,
 }
 
 /// What can be taken back, and what was.
@@ -47,13 +50,14 @@ impl History {
     }
 }
 
-/// What of an action makes it one step with the next; `None` where it changes nothing of the scene.
+/// What of an action makes it one step with the next; `None` where it is not taken back.
 fn kind(action: &Action, selected: Option<usize>) -> Option<String> {
     Some(match action {
         Action::Light(edit) => format!("light {}", edit.light),
         Action::TurnSun { .. } => "sun".into(),
         Action::Sky(_) => "sky".into(),
         Action::TurnSky(_) => "turn".into(),
+        Action::Rays(_) => "rays".into(),
         Action::Move(_) => format!("move {}", selected?),
         // Each of these is a step of its own.
         Action::AddLight(_) | Action::RemoveLight(_) | Action::Reset | Action::Floor => String::new(),
@@ -74,6 +78,8 @@ impl State {
             sky: shown.sky.clone(),
             added: shown.added,
             sky_added: shown.sky_added,
+            rays: self.settings.rays,
+            version: self.version,
         })
     }
 
@@ -111,6 +117,11 @@ impl State {
         };
         to.push(now);
         self.history.last = None;
+        self.settings.rays = step.rays;
+        // Light that has not changed need not be found anew.
+        if step.version == self.version {
+            return;
+        }
         let Some(shown) = &mut self.shown else { return };
         let scene = Arc::make_mut(&mut shown.scene);
         (scene.lights, scene.environment) = (step.lights, step.environment);
@@ -152,6 +163,20 @@ mod tests {
         assert!(state.messages.iter().any(|m| m.text == "nothing to undo"));
         (0..3).for_each(|_| state.apply(Action::Redo));
         assert_eq!((place(&state), lights(&state), state.history.len()), (moved, all, [3, 0]));
+        // So are rays, and a reset brings all of them back.
+        (0..3).for_each(|i| state.apply(Action::Rays(0.5 / f32::from(1u8 << i))));
+        state.apply(Action::Reset);
+        assert_eq!((state.settings.rays, state.history.len()), (1.0, [5, 0]));
+        for rays in [0.125, 1.0] {
+            state.apply(Action::Undo);
+            assert_eq!(state.settings.rays, rays);
+        }
+        assert_eq!(state.history.len(), [3, 2]);
+        // Alone, they leave the scene as it is.
+        let version = state.version;
+        state.apply(Action::Rays(0.25));
+        state.apply(Action::Undo);
+        assert_eq!((state.settings.rays, state.version, state.history.len()), (1.0, version, [3, 1]));
         // A new change makes an end to what was taken back.
         state.apply(Action::Undo);
         state.apply(Action::Sky(0.1));

@@ -79,7 +79,11 @@ pub fn lights(ui: &mut Ui, state: &mut State, memory: &mut Memory) {
         if ui.button("Load environment…").on_hover_text("A lat-long picture: .hdr or .exr").clicked() {
             state.apply(Action::Browse(true));
         }
-        if ui.button("Reset").on_hover_text("Lights, objects and environment as the file has them (U)").clicked() {
+        if ui
+            .button("Reset")
+            .on_hover_text("Lights, objects and environment as the file has them, and all rays (U)")
+            .clicked()
+        {
             state.apply(Action::Reset);
         }
     });

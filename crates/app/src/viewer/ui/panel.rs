@@ -1,8 +1,9 @@
 //! The panel's sections: scene, method, view.
 
-use super::widgets::{drag, wide};
+use super::widgets::{drag, slider, wide};
 use super::{Facts, Memory, camera, frontier, light, marks, source_box, times};
 use crate::viewer::choice::{Side, Source, View};
+use crate::viewer::rays;
 use crate::viewer::state::{Action, NO_LINES, State};
 use egui::{RichText, Ui, Vec2};
 
@@ -171,6 +172,10 @@ fn method(ui: &mut Ui, state: &mut State, memory: &mut Memory, facts: &Facts<'_>
             state.apply(Action::View(view));
         }
         ui.end_row();
+        let traces = state.sources().into_iter().any(Source::gathers);
+        ui.add_enabled_ui(traces, |ui| ui.label("Rays a frame")).response.on_hover_text(RAYS);
+        ui.add_enabled_ui(traces, |ui| rays(ui, state, memory));
+        ui.end_row();
     });
     let sides = [Side::Left, Side::Right].into_iter().take(state.sources().len());
     let waits = sides.filter(|side| facts.by[*side as usize].as_ref().is_some_and(|by| by.why.is_some()));
@@ -206,6 +211,25 @@ fn method(ui: &mut Ui, state: &mut State, memory: &mut Memory, facts: &Facts<'_>
     if state.sources().len() == 2 {
         verdict(ui, state, facts);
     }
+}
+
+const RAYS: &str = "Share of one ray for each 4×4 pixels that a frame sends, of methods that trace rays. Few: faster frames, but \
+    noise, and light that follows changes slowly. The first 16 frames of a view always send all, and a view at rest \
+    sends a fourth by itself.";
+
+/// A place for each share; what is between them stands where it is nearest.
+fn rays(ui: &mut Ui, state: &mut State, memory: &mut Memory) {
+    ui.horizontal(|ui| {
+        let mut place = rays::nearest(state.settings.rays);
+        ui.spacing_mut().slider_width = (ui.available_width() - 56.0).clamp(30.0, 200.0);
+        let response = ui.add(slider(&mut place, 0..=rays::SHARES.len() - 1).show_value(false));
+        memory.place("rays", &response);
+        if response.changed() {
+            state.apply(Action::Rays(rays::SHARES[place]));
+        }
+        ui.label(rays::share(state.settings.rays));
+        response.on_hover_text(RAYS).on_disabled_hover_text(RAYS);
+    });
 }
 
 /// How far apart both sides are; as high as ever while nobody knows.

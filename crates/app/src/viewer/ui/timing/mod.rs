@@ -24,6 +24,8 @@ const WEAK: Color32 = Color32::from_rgb(0xb0, 0xb0, 0xb0);
 const WARN: Color32 = Color32::from_rgb(0xff, 0xb4, 0x4c);
 /// Width of the whole overlay, points.
 const WIDTH: f32 = 384.0;
+const RAYS: &str =
+    "rays that the cells of a frame have sent, without those of the cache; a picture at rest sends a fourth";
 /// Edge of the signs that unfold and close it, points.
 const SIGN: f32 = 16.0;
 
@@ -124,11 +126,22 @@ fn sums(ui: &mut Ui, state: &mut State, memory: &mut Memory, facts: &Facts<'_>, 
             rate(ui, facts);
         }
         pair(ui, facts, rect.width() > 340.0);
+        if let Some(count) = rays(facts).filter(|_| rect.width() > 520.0) {
+            text(ui, count, 17.0, TEXT).on_hover_text(RAYS);
+            text(ui, "rays", 12.0, WEAK).on_hover_text(RAYS);
+        }
         if rect.width() > 440.0 {
             graph::sparkline(ui, facts);
         }
         buttons(ui, state, memory);
     });
+}
+
+/// Rays a frame; none by methods that send none.
+fn rays(facts: &Facts<'_>) -> Option<String> {
+    let gathers = facts.by.iter().flatten().any(|by| by.source.gathers());
+    let count = facts.times.now.rays.map(|n| crate::viewer::rays::count(n as f64));
+    count.or(gathers.then(|| "–".into()))
 }
 
 /// GPU and CPU time.
@@ -188,8 +201,10 @@ fn whole(ui: &mut Ui, state: &mut State, memory: &mut Memory, facts: &Facts<'_>,
     let [w, h] = run.size;
     let count = main(facts).2.map_or(0, |s| s.count);
     let frames = if count == 1 { "frame" } else { "frames" };
-    let of = format!("{} · {w}×{h} · median of {count} {frames}", run.method);
-    ui.add(egui::Label::new(RichText::new(of).size(12.0).color(WEAK)).truncate());
+    let rays = rays(facts).map_or(String::new(), |count| format!(" · {count} rays"));
+    let of = format!("{} · {w}×{h}{rays} · {count} {frames}", run.method);
+    let response = ui.add(egui::Label::new(RichText::new(of).size(12.0).color(WEAK)).truncate());
+    response.on_hover_text(format!("medians of so many frames; {RAYS}"));
     if facts.software {
         let told = "Software rendering: images are correct, timings are not representative.";
         ui.add(egui::Label::new(RichText::new(told).size(12.0).color(WARN)).truncate());
