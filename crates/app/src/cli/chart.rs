@@ -334,7 +334,7 @@ fn print(args: &Args, record: &Record, metric: Metric) {
     say!("{}", report::table(record, metric).trim_end());
     if let Some(g) = &record.generator {
         let ms = g.wall_ms.map_or("not run".to_owned(), |s| format!("{:.1} ms here", s.median));
-        say!("the paper's generator: {ms}, {:.1} GFLOP, projected {:.1} ms", g.gflop(), g.projected_ms());
+        say!("the paper's generator: {ms}, {:.1} GFLOP, modelled for a GTX 1050 {:.0} ms", g.gflop(), g.modelled());
     }
     say!("{}; `python training/chart.py {}` draws it", args.out.join("chart.json").display(), args.out.display());
 }

@@ -2,6 +2,7 @@
 //! each dispatch is done by a pipeline that counts (`instrument`), which adds
 //! up in a place of its own.
 
+mod chain;
 mod instrument;
 
 use bouncelight::gpu::bound::Bound;
@@ -12,7 +13,7 @@ use std::borrow::Cow;
 use std::cell::RefCell;
 use std::rc::Rc;
 
-/// Dispatches of a frame that there is room for, and bytes of each.
+/// Dispatches of a frame that there is room for, and bytes of each: 32 pairs of words.
 const DISPATCHES: usize = 4096;
 const STRIDE: u64 = 256;
 
@@ -40,6 +41,15 @@ pub(crate) struct Counted {
     pub operations: [f64; 2],
     /// Rays into triangles.
     pub rays: f64,
+    /// Threads dispatched, in whole 32s.
+    pub threads: f64,
+    /// Reads of memory that wait for the one before, of all threads as each of 32 goes with the
+    /// slowest.
+    pub links: f64,
+    /// Links and operations of the slowest 32.
+    pub longest: [f64; 2],
+    /// Barriers that a thread meets.
+    pub barriers: f64,
     /// Bytes of each binding, added up: what was asked for, but no more than there is, since what
     /// is there need not come from memory twice.
     pub bytes: f64,
@@ -85,7 +95,18 @@ impl Count {
             };
             let bytes = bindings.as_ref()?.iter().enumerate().filter_map(asked).sum();
             let operations = [number(0), number(NUMBERS)];
-            Some(Counted { label: dispatch.label, operations, rays: number(1), bytes })
+            let low_high = |i: usize| [words[2 * (NUMBERS + i)], words[2 * (NUMBERS + i) + 1]].map(f64::from);
+            let [links, barriers] = low_high(2);
+            Some(Counted {
+                label: dispatch.label,
+                operations,
+                rays: number(1),
+                threads: number(NUMBERS + 4),
+                links: number(NUMBERS + 1),
+                longest: [links, low_high(3)[0]],
+                barriers,
+                bytes,
+            })
         });
         Ok(found.collect())
     }
