@@ -280,6 +280,10 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
         assert_eq!(found.operations[1], slowest.iter().sum::<f64>());
         // Of what is read there are 200 numbers only; of what is written, 128 vectors.
         assert_eq!((found.bytes, found.rays), (4.0 * 200.0 + 16.0 * 128.0, 0.0));
+        // A read a round waits for the one before; the slowest goes round most often.
+        assert_eq!((found.threads, found.barriers), (128.0, 0.0));
+        assert_eq!(found.links, 32.0 * (31.0 + 63.0 + 95.0 + 127.0));
+        assert_eq!(found.longest, [127.0, 3.0 * 127.0 + 3.0 + 4.0]);
         // Negative controls: an operation more in the loop; half of the rounds; half of what is
         // written.
         let other = |from: &str, to: &str| {
@@ -288,6 +292,13 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
         };
         let more = other("sum += given[i];", "sum += given[i] * 3.0;");
         assert_eq!(more.operations[0], found.operations[0] + rounds);
+        // Reads that need nothing of each other are under way together; those that do wait.
+        let two = other("given[i]", "given[i] * given[i + 1u]");
+        assert_eq!((two.links, two.longest[0]), (found.links, 127.0));
+        let chained = other("given[i]", "given[u32(given[i])]");
+        assert_eq!((chained.links, chained.longest[0]), (2.0 * found.links, 254.0));
+        let called = LOOP.replace("given[i]", "read(i)") + "fn read(i: u32) -> f32 { return given[u32(given[i])]; }";
+        assert_eq!(counted(&gpu, &called).links, chained.links);
         let fewer = other("i++", "i += 2u");
         assert!(fewer.operations[0] < found.operations[0] && fewer.operations[1] < found.operations[1]);
         let narrow = other("    made[id.x] = all;", "    if id.x < 64u { made[id.x] = all; }");
@@ -295,7 +306,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
         // Who works before a barrier and who works behind it wait for each other.
         let halves = LOOP.replace("    var all = vec4f(sum);", "    workgroupBarrier();\n    var all = vec4f(sum);");
         let met = counted(&gpu, &halves);
-        assert_eq!(met.operations[0], found.operations[0]);
+        assert_eq!((met.operations[0], met.barriers), (found.operations[0], 1.0));
         let behind = "(id.x & 1u) == 1u";
         assert_eq!(met.operations[1], found.operations[1], "the slowest are the slowest on both sides");
         let turned = [LOOP, &halves].map(|text| counted(&gpu, &text.replace(behind, "(id.x & 31u) == 0u")));
