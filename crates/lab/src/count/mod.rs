@@ -297,7 +297,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
         assert_eq!((two.links, two.longest[0]), (found.links, 127.0));
         let chained = other("given[i]", "given[u32(given[i])]");
         assert_eq!((chained.links, chained.longest[0]), (2.0 * found.links, 254.0));
-        let called = LOOP.replace("given[i]", "read(i)") + "fn read(i: u32) -> f32 { return given[u32(given[i])]; }";
+        let called = LOOP.replace("given[i]", "fetch(i)") + "fn fetch(i: u32) -> f32 { return given[u32(given[i])]; }";
         assert_eq!(counted(&gpu, &called).links, chained.links);
         let fewer = other("i++", "i += 2u");
         assert!(fewer.operations[0] < found.operations[0] && fewer.operations[1] < found.operations[1]);
