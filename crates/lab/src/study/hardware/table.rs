@@ -1,6 +1,6 @@
 //! The record as Markdown.
 
-use super::{FrameRow, HardwareReport, frames::Timing};
+use super::{FrameRow, HardwareReport};
 use crate::study::projection::{Card, GTX_1050, GTX_1650, modelled};
 use std::fmt::Write;
 
@@ -69,7 +69,7 @@ impl HardwareReport {
             "Milliseconds; medians. The last columns are modelled, not measured, with a range that eight of ten passes \
              kept to that the model had not seen. *Own*: the passes that find and add indirect light{}. *Measured / \
              modelled*: own passes over what the model says of this device{}.\n",
-            if self.frames.iter().any(|r| r.timing == Timing::Clock) {
+            if self.frames.iter().any(|r| r.measured.own_ms().is_none()) {
                 ", by their timestamps; with `~` by the synchronised clock less that of `direct`, where timestamps \
                  are missing or do not agree with it"
             } else {
@@ -89,17 +89,15 @@ impl HardwareReport {
             let time = |t: Option<f64>| t.map_or("-".into(), |t| format!("{t:.2}"));
             let counted = m.costs.iter().any(|c| c.dispatches > 0.0);
             let of = |card: &Card| if counted { modelled(&m.costs, card).to_string() } else { "-".into() };
-            let ratio =
-                here.filter(|_| counted).map(|card| m.own_ms().unwrap_or(r.own_ms) / modelled(&m.costs, &card).ms);
+            let (mark, own) = m.own_ms().map_or(("~", r.own_ms), |ms| ("", ms));
+            let ratio = here.filter(|_| counted).map(|card| own / modelled(&m.costs, &card).ms);
             let method = if r.precision == "f32" { m.method.clone() } else { format!("{}, {}", m.method, r.precision) };
             writeln!(
                 out,
-                "| {} | {}x{} | `{method}` | {}{:.2} | {} | {} | {:.2} | {:.0} | {} | {} | {} |",
+                "| {} | {}x{} | `{method}` | {mark}{own:.2} | {} | {} | {:.2} | {:.0} | {} | {} | {} |",
                 r.scene,
                 r.size[0],
                 r.size[1],
-                if r.timing == Timing::Clock { "~" } else { "" },
-                r.own_ms,
                 time(m.gpu_ms.map(|t| t.median)),
                 time(m.gpu_ms.map(|t| t.p95)),
                 m.wall_ms.median,

@@ -28,6 +28,9 @@ enum Clock {
     Rays,
 }
 
+/// Whether a row is of a kind.
+type Is = fn(&Row) -> bool;
+
 /// A pass that was measured, and what it did.
 #[derive(Debug, Clone, PartialEq)]
 struct Row {
@@ -69,14 +72,14 @@ pub fn fit(report: &HardwareReport) -> Option<Fit> {
     }
     let shares = [&before, &after, &left].map(|errors| share(errors.iter()));
     let mut text = String::from("| rows | | roofline of 35 % | fitted | left out |\n|---|---|---|---|---|\n");
-    let kinds: [(&str, &dyn Fn(&Row) -> bool); 4] = [
-        ("passes, by timestamps", &|r| r.clock == Clock::Timestamps && !r.cost.pass.starts_with("net.")),
-        ("layers in frames", &|r| r.clock == Clock::Timestamps && r.cost.pass.starts_with("net.")),
-        ("layers alone", &|r| r.clock == Clock::Layers),
-        ("rays", &|r| r.clock == Clock::Rays),
+    let kinds: [(&str, Is); 5] = [
+        ("passes, by timestamps", |r| r.clock == Clock::Timestamps && !r.cost.pass.starts_with("net.")),
+        ("layers in frames", |r| r.clock == Clock::Timestamps && r.cost.pass.starts_with("net.")),
+        ("layers alone", |r| r.clock == Clock::Layers),
+        ("rays", |r| r.clock == Clock::Rays),
+        ("all", |_| true),
     ];
-    let all: (&str, &dyn Fn(&Row) -> bool) = ("all", &|_| true);
-    for (name, of) in kinds.into_iter().chain([all]) {
+    for (name, of) in kinds {
         let of_kind = |errors: &[f64]| share(rows.iter().zip(errors).filter(|(r, _)| of(r)).map(|(_, e)| e)) * 100.0;
         let count = rows.iter().filter(|r| of(r)).count();
         // Writing into a text cannot fail.
