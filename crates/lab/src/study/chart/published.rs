@@ -43,9 +43,9 @@ pub struct Generator {
 }
 
 impl Generator {
-    /// What a GTX 1050 would take by the model.
-    pub fn modelled(&self) -> Modelled {
-        modelled(&self.costs, &GTX_1050)
+    /// What a GTX 1050 would take by the model; none where threads were not counted.
+    pub fn modelled(&self) -> Option<Modelled> {
+        self.costs.iter().all(Cost::has_threads).then(|| modelled(&self.costs, &GTX_1050))
     }
 
     /// Arithmetic, GFLOP.

@@ -35,7 +35,9 @@ pub fn csv(record: &Record) -> String {
             let score = |f: &dyn Fn(&Scores) -> Option<f64>| scores.as_ref().and_then(f);
             let gpu = time.as_ref().and_then(|t| t.gpu_ms);
             let wall = time.as_ref().map(|t| t.wall_ms);
-            let projected = (entry.map(|e| e.kind) != Some(Kind::Paths)).then(|| modelled(&unit.costs, &GTX_1050).ms);
+            let whole = unit.costs.iter().all(|c| c.has_threads());
+            let projected =
+                (whole && entry.map(|e| e.kind) != Some(Kind::Paths)).then(|| modelled(&unit.costs, &GTX_1050).ms);
             let numbers = [
                 score(&|s| s.light),
                 score(&|s| s.light_bias),
@@ -281,6 +283,7 @@ fn frontiers(record: &Record, metric: Metric) -> String {
 fn generator(record: &Record) -> String {
     let Some(g) = &record.generator else { return String::new() };
     let [w, h] = g.size;
+    let modelled = g.modelled().map_or("no, as its threads were not counted".into(), |m| format!("{m:.0} ms"));
     let ran = match (&g.wall_ms, &g.failed) {
         (Some(ms), _) => format!("takes {:.1} ms here by the clock", ms.median),
         (None, Some(why)) => format!("was not run: {why}"),
@@ -289,13 +292,12 @@ fn generator(record: &Record) -> String {
     format!(
         "**The paper's generator** ({} parameters, group norm, numbers nobody trained) at {w}×{h} {ran}, the raster \
          before it not counted; \
-         {:.1} GFLOP by count; modelled for a {}: {:.0} ms. Printed by its authors: {PRINTED_MS:.0} ms on that card \
+         {:.1} GFLOP by count; modelled for a {}: {modelled}. Printed by its authors: {PRINTED_MS:.0} ms on that card \
          at 1024×512, by a clock that \
          did not wait for the GPU, and L1 {PRINTED_L1:.0} on their own 375 pictures.\n",
         g.parameters,
         g.gflop(),
-        GTX_1050.name,
-        g.modelled()
+        GTX_1050.name
     )
 }
 

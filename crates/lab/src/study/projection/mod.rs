@@ -60,6 +60,11 @@ impl Cost {
         Self { pass: pass.into(), flops, bytes, ..Self::default() }
     }
 
+    /// Whether threads were counted, without which a time would leave out most of what takes it.
+    pub fn has_threads(&self) -> bool {
+        self.dispatches > 0.0
+    }
+
     /// The same with so many rays.
     pub fn with_rays(self, rays: f64) -> Self {
         Self { rays, ..self }
