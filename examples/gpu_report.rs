@@ -1,22 +1,27 @@
 //! What `cargo xtask gpu-report` runs: measures this device and writes DEVICE.json and DEVICE.md.
 //!
-//!     gpu_report [--out FOLDER] [--minutes M] [--sizes WxH,WxH,…] [--scenes NAME,…] [--triangles N,…] [--commit HASH] [--no-pytorch]
+//!     gpu_report --fit FILE | [--out FOLDER] [--minutes M] [--sizes WxH,WxH,…] [--scenes NAME,…] [--triangles N,…] [--commit HASH] [--no-pytorch]
+//!
+//! `--fit FILE` measures nothing: it fits the model of `study::projection` to the record FILE, writes
+//! its parameters and the record's tables anew, and prints how well they agree.
 
 use bouncelight::gpu::{Gpu, GpuOptions};
 use bouncelight_lab::study::hardware::{HardwareOptions, HardwareReport, measure};
+use bouncelight_lab::study::projection;
 use bouncelight_scene::image_io::write_whole;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 use std::process::{Command, ExitCode};
 use std::time::{Duration, Instant};
 
-const USAGE: &str = "usage: gpu_report [--out FOLDER] [--minutes M] [--sizes WxH,...] [--scenes NAME,...] \
+const USAGE: &str = "usage: gpu_report --fit FILE | [--out FOLDER] [--minutes M] [--sizes WxH,...] [--scenes NAME,...] \
     [--triangles N,...] [--commit HASH] [--no-pytorch]";
 
 /// Scenes that need no file: the usual room, a box with one lamp, a closed interior.
 const SCENES: &str = "paper-room:2,interior,cornell";
-/// The second is the one that all scenes are measured at.
-const SIZES: &str = "512x256,1024x512,1920x1080,2048x1024,3840x2160";
+/// The second is the one that all scenes are measured at; the last has 27 times its pixels, as an
+/// H100 is 26 GTX 1050s.
+const SIZES: &str = "512x256,1024x512,1920x1080,2048x1024,3840x2160,5376x2688";
 const TRIANGLES: &str = "1000,10000,100000,1000000";
 
 /// Time that PyTorch is given, seconds: importing it takes ten.
@@ -28,7 +33,11 @@ struct Args {
     options: [String; 3],
     commit: Option<String>,
     pytorch: bool,
+    fit: Option<PathBuf>,
 }
+
+/// Where the program reads the model's parameters from.
+const MODEL: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/crates/lab/src/study/projection/model.json");
 
 fn args() -> Result<Args, String> {
     let mut args = Args {
@@ -37,6 +46,7 @@ fn args() -> Result<Args, String> {
         options: [SCENES, SIZES, TRIANGLES].map(str::to_owned),
         commit: None,
         pytorch: true,
+        fit: None,
     };
     let mut words = std::env::args().skip(1);
     while let Some(word) = words.next() {
@@ -52,6 +62,7 @@ fn args() -> Result<Args, String> {
             "--sizes" => args.options[1] = value()?,
             "--triangles" => args.options[2] = value()?,
             "--commit" => args.commit = Some(value()?),
+            "--fit" => args.fit = Some(value()?.into()),
             "--no-pytorch" => args.pytorch = false,
             other => return Err(format!("`{other}` is not known\n{USAGE}")),
         }
@@ -72,13 +83,36 @@ fn main() -> ExitCode {
             return ExitCode::from(2);
         }
     };
-    match report(args) {
+    let done = match &args.fit {
+        Some(record) => fit(record),
+        None => report(args),
+    };
+    match done {
         Ok(()) => ExitCode::SUCCESS,
         Err(e) => {
             eprintln!("error: {e}");
             ExitCode::FAILURE
         }
     }
+}
+
+/// Fits the model to a record.
+fn fit(path: &Path) -> Result<(), Box<dyn std::error::Error>> {
+    let text = std::fs::read_to_string(path).map_err(|e| format!("{}: {e}", path.display()))?;
+    let report: HardwareReport = serde_json::from_str(&text).map_err(|e| format!("{}: {e}", path.display()))?;
+    let found = projection::fit::fit(&report)
+        .ok_or(format!("{}: its device's data sheet is not known, or it holds no counts of threads", path.display()))?;
+    println!("{}\n{}", found.text, serde_json::to_string_pretty(&found.model)?);
+    write_whole(Path::new(MODEL), format!("{}\n", serde_json::to_string_pretty(&found.model)?).as_bytes())?;
+    eprintln!("wrote {MODEL}");
+    if found.model.parameters == *projection::model() {
+        let page = path.with_extension("md");
+        write_whole(&page, report.markdown().as_bytes())?;
+        eprintln!("wrote {}", page.display());
+    } else {
+        eprintln!("the tables of the record follow when this is run again, by a program with these parameters");
+    }
+    Ok(())
 }
 
 fn report(args: Args) -> Result<(), Box<dyn std::error::Error>> {

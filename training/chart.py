@@ -1,4 +1,4 @@
-"""Draws what `bouncelight chart` measured: error up, time across, once as measured and once as projected for a GTX 1050.
+"""Draws what `bouncelight chart` measured: error up, time across, once as measured and once as modelled for a GTX 1050.
 
     python training/chart.py docs/results [--metric light|flip|l1]
 
@@ -100,7 +100,7 @@ def main():
     here.set_title(f"Measured: {device['adapter']}{' (a CPU driver, no GPU)' if device['software'] else ''}", loc="left")
     here.set(xlabel=f"time of a whole frame, ms ({'timestamps' if clock.startswith('gpu') else 'synchronised clock'})", ylabel=TITLES[a.metric])
     panel(there, found, "projected", "projected")
-    there.set_title("PROJECTED, NOT MEASURED: GTX 1050 at 35 % of its peaks", loc="left", fontsize=9)
+    there.set_title("MODELLED, NOT MEASURED: GTX 1050", loc="left", fontsize=9)
     there.set(xlabel="light's own passes by count, ms (without the rasteriser)")
     scenes = [s["name"] for s in record["scenes"] if not s.get("failed")]
     w, h = record["size"]

@@ -391,19 +391,19 @@ proptest! {
 }
 
 #[test]
-fn the_shipped_filter_is_projected_within_a_millisecond() {
-    use bouncelight_lab::study::projection::{Cost, EFFICIENCY, GTX_1050, total_ms};
+fn the_shipped_filter_is_modelled_within_two_and_a_half_milliseconds() {
+    use bouncelight_lab::study::projection::{Cost, GTX_1050, modelled};
     let weights = Weights::shipped().expect("it is whole");
     let ms = |precision, packed_input| {
         let options = Options { precision, packed_input, ..Options::default() };
         let plan = Plan::with(&weights.graph, 256, 128, &options).expect("it fits");
-        let cost = |s: &Step| Cost::new(&s.name, s.flops as f64, s.traffic as f64);
-        total_ms(&plan.steps.iter().map(cost).collect::<Vec<_>>(), &GTX_1050, EFFICIENCY)
+        let costs: Vec<Cost> = plan.steps.iter().map(|s| Cost::of_step(&plan, s, &s.name)).collect();
+        modelled(&costs, &GTX_1050).ms
     };
     let [full, half, packed] = [(Precision::F32, false), (Precision::F16, false), (Precision::F16, true)]
         .map(|(precision, packed)| ms(precision, packed));
     println!("{full:.3} ms in 32 bits, {half:.3} in 16 with an input of 32, {packed:.3} with one of 16");
-    assert!(packed < 1.0, "{packed}");
+    assert!(packed < 2.5, "{packed}");
     // Negative control: what it takes as other networks run.
-    assert!(full > 1.1 && half > packed, "{full} {half}");
+    assert!(full > 2.5 && half > packed, "{full} {half}");
 }

@@ -28,6 +28,7 @@ usage: cargo xtask COMMAND
          (some 280 crates, which two cores build in half an hour)
   gpu-report [--dev] [--minutes M] [--sizes WxH,...] [--scenes NAME,...] [--triangles N,...] [--out FOLDER] [--no-pytorch]
          measures on this device all that docs/ projects: docs/measured/DEVICE.json and DEVICE.md, in less than eight minutes
+         --fit FILE fits the model of what cards take to such a record instead, and says how well they agree
          (--dev builds without release's optimisation: for rehearsals)
   conformance
          docs/reports/conformance.md: glTF feature by feature, the rasteriser beside the path tracer

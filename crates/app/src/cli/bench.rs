@@ -16,7 +16,7 @@ use bouncelight_lab::study::{
     bench::{BenchOptions, Measurement, measure},
     count,
     layers::Layers,
-    projection::{self, Cost, EFFICIENCY, GTX_1050},
+    projection::{self, Cost, GTX_1050, GTX_1650, modelled},
 };
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
@@ -43,7 +43,7 @@ pub struct Args {
     /// One row per network layer instead of one for the network.
     #[arg(long, help_heading = MEASURE)]
     layers: bool,
-    /// Also count operations, bytes and rays of a frame, and project times from them.
+    /// Also count operations, bytes, rays and threads of a frame, and model times of cards from them.
     #[arg(long, help_heading = MEASURE)]
     count: bool,
     /// Record to write.
@@ -164,7 +164,8 @@ pub fn run(global: &Global, args: Args) -> Result<()> {
     if args.count {
         for (method, measured) in methods.iter().zip(&mut measured) {
             let still = count::Still { scene: &scene, camera: &camera, size: args.scene.size };
-            measured.costs = count::frame(&gpu, still, with(method), method.frames_to_rest())?;
+            let costs = count::frame(&gpu, still, with(method), method.frames_to_rest())?;
+            *measured = measured.clone().with_costs(costs);
         }
     }
     let network = if args.layers && names.contains(&MethodName::Neural) {
@@ -233,14 +234,23 @@ fn print(record: &Record, gpu: &Gpu, layers: bool) {
 /// What shaders counted of a frame at rest; without `layers` the network's layers are one row.
 fn print_costs(costs: &[Cost], layers: bool) {
     let ms = format!("{} ms", GTX_1050.name);
-    say!("  {:<26}{:>10}{:>10}{:>10}{:>10}{ms:>14}", "counted, at rest", "MFLOP", "waiting", "MB", "Mray");
+    say!(
+        "  {:<26}{:>10}{:>10}{:>10}{:>10}{:>11}{ms:>13}",
+        "counted, at rest",
+        "MFLOP",
+        "waiting",
+        "MB",
+        "Mray",
+        "k threads"
+    );
     let row = |name: &str, of: &[&Cost]| {
         // A sum of nothing is -0.
         let sum = |part: fn(&Cost) -> f64| of.iter().map(|c| part(c)).sum::<f64>() / 1e6 + 0.0;
         let [flops, waited] = [sum(|c| c.flops), sum(|c| c.waited)];
         let [bytes, rays] = [sum(|c| c.bytes), sum(|c| c.rays)];
-        let ms = of.iter().map(|c| projection::pass_ms(c, &GTX_1050, EFFICIENCY)).sum::<f64>() + 0.0;
-        say!("  {name:<26}{flops:>10.2}{waited:>10.2}{bytes:>10.2}{rays:>10.4}{ms:>14.3}");
+        let threads = sum(|c| c.threads) * 1e3;
+        let ms = modelled(of.iter().copied(), &GTX_1050).ms;
+        say!("  {name:<26}{flops:>10.2}{waited:>10.2}{bytes:>10.2}{rays:>10.4}{threads:>11.1}{ms:>13.3}");
     };
     let network: Vec<_> = costs.iter().filter(|c| !layers && c.pass.starts_with("net.")).collect();
     costs.iter().filter(|c| layers || !c.pass.starts_with("net.")).for_each(|c| row(&c.pass, &[c]));
@@ -248,7 +258,10 @@ fn print_costs(costs: &[Cost], layers: bool) {
         row("net (all layers)", &network);
     }
     row("indirect light in all", &costs.iter().filter(|c| projection::is_indirect(&c.pass)).collect::<Vec<_>>());
-    say!("  milliseconds are projected, not measured: {:.0}% of that card's peaks", EFFICIENCY * 100.0);
+    let own = || costs.iter().filter(|c| projection::is_indirect(&c.pass));
+    for card in [GTX_1050, GTX_1650] {
+        say!("  modelled for a {}, not measured: {:.1} ms", card.name, modelled(own(), &card));
+    }
 }
 
 /// What the last frame drew and left out.

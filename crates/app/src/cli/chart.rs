@@ -334,7 +334,8 @@ fn print(args: &Args, record: &Record, metric: Metric) {
     say!("{}", report::table(record, metric).trim_end());
     if let Some(g) = &record.generator {
         let ms = g.wall_ms.map_or("not run".to_owned(), |s| format!("{:.1} ms here", s.median));
-        say!("the paper's generator: {ms}, {:.1} GFLOP, projected {:.1} ms", g.gflop(), g.projected_ms());
+        let modelled = g.modelled().map_or(String::new(), |m| format!(", modelled for a GTX 1050 {m:.0} ms"));
+        say!("the paper's generator: {ms}, {:.1} GFLOP{modelled}", g.gflop());
     }
     say!("{}; `python training/chart.py {}` draws it", args.out.join("chart.json").display(), args.out.display());
 }

@@ -32,7 +32,7 @@ pub struct Args {
     /// Most milliseconds a frame of the method's own passes at --size, 0 or more [default: no limit].
     #[arg(long, value_name = "MS", value_parser = parse_budget, help_heading = CHOICE)]
     budget_ms: Option<f64>,
-    /// Times: measured here, or projected for a GTX 1050; auto projects on software adapters.
+    /// Times: measured here, or modelled for a GTX 1050; auto models on software adapters.
     #[arg(long, value_enum, default_value = "auto", help_heading = CHOICE)]
     cost: Cost,
     /// Views to judge, 1 to 64: the file's cameras, then others; --eye replaces them.

@@ -45,7 +45,7 @@ fn a_small_chart_is_made_and_taken_up_again() {
     let scenes = ["--scenes", "cornell,paper-room:7", "--page", page.to_str().expect("a plain path")];
     let done = chart(&out, &scenes).success();
     let said = String::from_utf8_lossy(&done.get_output().stdout).into_owned();
-    assert!(said.contains("projected") && said.contains("never measured") && said.contains("ambient"), "{said}");
+    assert!(said.contains("modelled") && said.contains("never measured") && said.contains("ambient"), "{said}");
     let record = json(&out);
     assert_eq!(record["schema"], 1);
     // Two methods and two counts of paths in two scenes.

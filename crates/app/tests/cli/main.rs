@@ -7,6 +7,7 @@ mod cli;
 #[path = "../../../../tests/common/mod.rs"]
 mod common;
 mod compare;
+mod counted;
 mod dataset;
 mod export;
 #[path = "../../../../tests/common/figures.rs"]

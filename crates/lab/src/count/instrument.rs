@@ -6,20 +6,24 @@
 //! like floats, a multiply-add 2, a division or transcendental function 4; addresses, moves and
 //! signs are free.
 
+use super::chain::Chain;
 use naga::front::Typifier;
 use naga::proc::ResolveContext;
 use naga::{
     AddressSpace, BinaryOperator, Binding, Block, BuiltIn, Expression, Function, FunctionArgument, Handle, Literal,
     MathFunction, Module, Scalar, Span, Statement, Type, TypeInner, UnaryOperator,
 };
+use std::collections::HashSet;
 
 /// Group of the sums.
 pub const GROUP: usize = 3;
 /// Numbers that `counted.wgsl` keeps of a thread, and the first that belongs to a binding.
-pub const NUMBERS: usize = 26;
-pub const FIRST: usize = 2;
+pub const NUMBERS: usize = 27;
+pub const FIRST: usize = 3;
 /// A function of each ray.
 const RAY: &str = "walk_begin";
+/// The number of links.
+const LINKS: usize = 2;
 
 /// A shader that counts, and what it counts.
 pub struct Counting {
@@ -50,6 +54,7 @@ pub fn counting(text: &str) -> Option<Counting> {
     }
     let named = |name: &str| module.functions.iter().find(|(_, f)| f.name.as_deref() == Some(name)).map(|(h, _)| h);
     let calls = Calls { add: named("counted_add")?, meet: named("counted_meet")? };
+    let mut reads = HashSet::new();
     let (start, end) = (named("counted_start")?, named("counted_end")?);
 
     let own = |f: &Function| f.name.as_ref().is_some_and(|n| n.starts_with("counted_"));
@@ -57,7 +62,9 @@ pub fn counting(text: &str) -> Option<Counting> {
     for handle in handles {
         let mut function = std::mem::take(&mut module.functions[handle]);
         let ray = function.name.as_deref() == Some(RAY);
-        count_in(&module, &mut function, calls, &bindings, u32::from(ray))?;
+        if count_in(&module, &mut function, calls, (&bindings, &reads), u32::from(ray))? {
+            reads.insert(handle);
+        }
         module.functions[handle] = function;
     }
     let word = module.types.insert(Type { name: None, inner: TypeInner::Scalar(Scalar::U32) }, Span::UNDEFINED);
@@ -66,7 +73,7 @@ pub fn counting(text: &str) -> Option<Counting> {
             continue;
         }
         let mut inner = std::mem::take(&mut module.entry_points[i].function);
-        count_in(&module, &mut inner, calls, &bindings, 0)?;
+        count_in(&module, &mut inner, calls, (&bindings, &reads), 0)?;
         module.entry_points[i].function = around(&mut module, inner, [start, end], word);
     }
     Some(Counting { module, bindings })
@@ -101,21 +108,25 @@ struct Calls {
     meet: Handle<Function>,
 }
 
-/// Puts the calls into a function. `rays` are those that each call of it is.
-fn count_in(module: &Module, function: &mut Function, calls: Calls, bindings: &[(u32, u32)], rays: u32) -> Option<()> {
+/// Puts the calls into a function; whether it reads memory, itself or by functions (those of the
+/// second part of `known`) that it calls. `rays` are those that each call of it is.
+fn count_in(module: &Module, function: &mut Function, calls: Calls, known: Known<'_>, rays: u32) -> Option<bool> {
     let before = function.expressions.clone();
     let context = ResolveContext::with_locals(module, &function.local_variables, &function.arguments);
     let mut types = Typifier::new();
     for (handle, _) in before.iter() {
         types.grow(handle, &before, &context).ok()?;
     }
-    let reader = Reader { module, expressions: &before, types: &types, bindings };
-    let mut writer = Writer { reader, expressions: &mut function.expressions, calls };
+    let reader = Reader { module, expressions: &before, types: &types, bindings: known.0 };
+    let mut writer = Writer { reader, expressions: &mut function.expressions, calls, chain: Chain::new(known.1) };
     let mut sum = [0; NUMBERS];
     sum[1] = rays;
     function.body = writer.block(std::mem::take(&mut function.body), sum);
-    Some(())
+    Some(writer.chain.read)
 }
+
+/// Bindings, and functions that read memory.
+type Known<'a> = (&'a [(u32, u32)], &'a HashSet<Handle<Function>>);
 
 /// Amounts by number.
 type Sum = [u32; NUMBERS];
@@ -124,6 +135,7 @@ struct Writer<'a> {
     reader: Reader<'a>,
     expressions: &'a mut naga::Arena<Expression>,
     calls: Calls,
+    chain: Chain<'a>,
 }
 
 impl Writer<'_> {
@@ -131,7 +143,15 @@ impl Writer<'_> {
     fn block(&mut self, block: Block, mut sum: Sum) -> Block {
         let mut out = Block::with_capacity(2 * block.len());
         for (mut statement, span) in block.span_into_iter() {
+            if let Statement::Call { function, .. } = statement
+                && self.chain.calls(function)
+            {
+                // What follows waits for what it has read.
+                self.calls(&mut sum, &mut out);
+                self.chain.read = true;
+            }
             self.reader.statement(&statement, &mut sum);
+            self.chain.statement(&statement, &self.reader);
             let jumps = matches!(
                 statement,
                 Statement::Break | Statement::Continue | Statement::Return { .. } | Statement::Kill
@@ -171,6 +191,7 @@ impl Writer<'_> {
 
     /// Adds what has come together.
     fn calls(&mut self, sum: &mut Sum, out: &mut Block) {
+        sum[LINKS] += self.chain.end();
         for (number, n) in std::mem::replace(sum, [0; NUMBERS]).into_iter().enumerate().filter(|(_, n)| *n > 0) {
             let arguments = [number as u32, n]
                 .map(|v| self.expressions.append(Expression::Literal(Literal::U32(v)), Span::UNDEFINED));
@@ -181,9 +202,9 @@ impl Writer<'_> {
 }
 
 /// What expressions and statements do.
-struct Reader<'a> {
+pub struct Reader<'a> {
     module: &'a Module,
-    expressions: &'a naga::Arena<Expression>,
+    pub expressions: &'a naga::Arena<Expression>,
     types: &'a Typifier,
     bindings: &'a [(u32, u32)],
 }
@@ -281,6 +302,11 @@ impl Reader<'_> {
                 _ => return None,
             }
         }
+    }
+
+    /// Whether a pointer or texture is a bound one's, which a read of takes long.
+    pub fn far(&self, at: Handle<Expression>) -> bool {
+        self.number(at, |space| matches!(space, AddressSpace::Storage { .. } | AddressSpace::Handle)).is_some()
     }
 
     fn inner(&self, e: Handle<Expression>) -> &TypeInner {

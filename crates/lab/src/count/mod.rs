@@ -2,6 +2,7 @@
 //! each dispatch is done by a pipeline that counts (`instrument`), which adds
 //! up in a place of its own.
 
+mod chain;
 mod instrument;
 
 use bouncelight::gpu::bound::Bound;
@@ -12,7 +13,7 @@ use std::borrow::Cow;
 use std::cell::RefCell;
 use std::rc::Rc;
 
-/// Dispatches of a frame that there is room for, and bytes of each.
+/// Dispatches of a frame that there is room for, and bytes of each: 32 pairs of words.
 const DISPATCHES: usize = 4096;
 const STRIDE: u64 = 256;
 
@@ -40,6 +41,15 @@ pub(crate) struct Counted {
     pub operations: [f64; 2],
     /// Rays into triangles.
     pub rays: f64,
+    /// Threads dispatched, in whole 32s.
+    pub threads: f64,
+    /// Reads of memory that wait for the one before, of all threads as each of 32 goes with the
+    /// slowest.
+    pub links: f64,
+    /// Links and operations of the slowest 32.
+    pub longest: [f64; 2],
+    /// Barriers that a thread meets.
+    pub barriers: f64,
     /// Bytes of each binding, added up: what was asked for, but no more than there is, since what
     /// is there need not come from memory twice.
     pub bytes: f64,
@@ -85,7 +95,18 @@ impl Count {
             };
             let bytes = bindings.as_ref()?.iter().enumerate().filter_map(asked).sum();
             let operations = [number(0), number(NUMBERS)];
-            Some(Counted { label: dispatch.label, operations, rays: number(1), bytes })
+            let low_high = |i: usize| [words[2 * (NUMBERS + i)], words[2 * (NUMBERS + i) + 1]].map(f64::from);
+            let [links, barriers] = low_high(2);
+            Some(Counted {
+                label: dispatch.label,
+                operations,
+                rays: number(1),
+                threads: number(NUMBERS + 4),
+                links: number(NUMBERS + 1),
+                longest: [links, low_high(3)[0]],
+                barriers,
+                bytes,
+            })
         });
         Ok(found.collect())
     }
@@ -259,6 +280,10 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
         assert_eq!(found.operations[1], slowest.iter().sum::<f64>());
         // Of what is read there are 200 numbers only; of what is written, 128 vectors.
         assert_eq!((found.bytes, found.rays), (4.0 * 200.0 + 16.0 * 128.0, 0.0));
+        // A read a round waits for the one before; the slowest goes round most often.
+        assert_eq!((found.threads, found.barriers), (128.0, 0.0));
+        assert_eq!(found.links, 32.0 * (31.0 + 63.0 + 95.0 + 127.0));
+        assert_eq!(found.longest, [127.0, 3.0 * 127.0 + 3.0 + 4.0]);
         // Negative controls: an operation more in the loop; half of the rounds; half of what is
         // written.
         let other = |from: &str, to: &str| {
@@ -267,6 +292,13 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
         };
         let more = other("sum += given[i];", "sum += given[i] * 3.0;");
         assert_eq!(more.operations[0], found.operations[0] + rounds);
+        // Reads that need nothing of each other are under way together; those that do wait.
+        let two = other("given[i]", "given[i] * given[i + 1u]");
+        assert_eq!((two.links, two.longest[0]), (found.links, 127.0));
+        let chained = other("given[i]", "given[u32(given[i])]");
+        assert_eq!((chained.links, chained.longest[0]), (2.0 * found.links, 254.0));
+        let called = LOOP.replace("given[i]", "fetch(i)") + "fn fetch(i: u32) -> f32 { return given[u32(given[i])]; }";
+        assert_eq!(counted(&gpu, &called).links, chained.links);
         let fewer = other("i++", "i += 2u");
         assert!(fewer.operations[0] < found.operations[0] && fewer.operations[1] < found.operations[1]);
         let narrow = other("    made[id.x] = all;", "    if id.x < 64u { made[id.x] = all; }");
@@ -274,7 +306,7 @@ fn main(@builtin(global_invocation_id) id: vec3u) {
         // Who works before a barrier and who works behind it wait for each other.
         let halves = LOOP.replace("    var all = vec4f(sum);", "    workgroupBarrier();\n    var all = vec4f(sum);");
         let met = counted(&gpu, &halves);
-        assert_eq!(met.operations[0], found.operations[0]);
+        assert_eq!((met.operations[0], met.barriers), (found.operations[0], 1.0));
         let behind = "(id.x & 1u) == 1u";
         assert_eq!(met.operations[1], found.operations[1], "the slowest are the slowest on both sides");
         let turned = [LOOP, &halves].map(|text| counted(&gpu, &text.replace(behind, "(id.x & 31u) == 0u")));

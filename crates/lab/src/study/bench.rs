@@ -1,7 +1,7 @@
 //! Time and memory of one method: GPU milliseconds per pass from timestamps, synchronised wall
 //! clock beside them.
 
-use crate::study::projection::{Cost, is_indirect};
+use crate::study::projection::{Card, Cost, GTX_1050, GTX_1650, Modelled, is_indirect, modelled};
 use bouncelight::gpu::{
     Gpu,
     timing::{self, Recorder},
@@ -10,6 +10,7 @@ use bouncelight::gpu_scene::SceneGpu;
 use bouncelight::render::{DrawnCount, RenderError, Renderer, View};
 use bouncelight::scene::Camera;
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
 use std::time::Instant;
 use thiserror::Error;
 use wgpu_profiler::{GpuProfiler, GpuProfilerSettings};
@@ -59,12 +60,28 @@ pub struct Measurement {
     /// What passes of a frame at rest do, where somebody has counted it (`study::count`).
     #[serde(default)]
     pub costs: Vec<Cost>,
+    /// What the counted passes that find and add indirect light are modelled to take on cards that
+    /// nobody has measured, by [`Card::key`].
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub modelled: BTreeMap<String, Modelled>,
     /// Draw calls, triangles and shadow maps of the last frame.
     #[serde(default)]
     pub drawn: DrawnCount,
 }
 
 impl Measurement {
+    /// The same with what was counted of it.
+    #[must_use]
+    pub fn with_costs(mut self, costs: Vec<Cost>) -> Self {
+        let of = |card: Card| {
+            let own = costs.iter().filter(|c| is_indirect(&c.pass));
+            (card.key.to_owned(), modelled(own, &card))
+        };
+        self.modelled = [GTX_1050, GTX_1650].map(of).into();
+        self.costs = costs;
+        self
+    }
+
     /// How far GPU time and wall clock are apart, as [`disagreement`] says. A driver that lets
     /// passes run on past their timestamps shows itself here.
     pub fn disagreement(&self) -> Option<f64> {
@@ -189,6 +206,7 @@ fn measure_frames(
         gpu_ms: (!sums.is_empty()).then(|| spread(sums)),
         wall_ms: spread(wall),
         costs: Vec::new(),
+        modelled: BTreeMap::new(),
         drawn: renderer.drawn(),
         bytes: renderer
             .bytes()

@@ -80,8 +80,15 @@ pub fn frame(gpu: &Gpu, still: Still<'_>, options: RendererOptions, frames: u32)
         costs[at].waited += slowest - done;
         costs[at].bytes += dispatch.bytes;
         costs[at].rays += dispatch.rays;
+        costs[at].dispatches += 1.0;
+        costs[at].threads += dispatch.threads;
+        costs[at].links += dispatch.links;
+        costs[at].longest += dispatch.longest[0];
+        costs[at].steps += dispatch.longest[1];
+        costs[at].barriers += dispatch.barriers;
     }
-    let steps = renderer.plan().map_or(&[][..], |plan| &plan.steps);
-    costs.extend(steps.iter().map(|s| Cost::new(&format!("net.{}", s.name), s.flops as f64, s.traffic as f64)));
+    if let Some(plan) = renderer.plan() {
+        costs.extend(plan.steps.iter().map(|s| Cost::of_step(plan, s, &s.name)));
+    }
     Ok(costs)
 }

@@ -5,7 +5,7 @@ use bouncelight::gi::Method;
 use bouncelight::render::capture::Layer;
 use bouncelight::scene::{Environment, LightKind};
 use bouncelight_lab::study::judge::{compare, light_error};
-use bouncelight_lab::study::projection::{EFFICIENCY, GTX_1050, total_ms};
+use bouncelight_lab::study::projection::{GTX_1050, modelled};
 use bouncelight_lab::study::session::{Edits, FrameChange, Session, SessionError, SessionOptions, Settling};
 use bouncelight_lab::study::truth;
 
@@ -41,7 +41,7 @@ fn pictures_are_judged_by_a_kept_reference() {
         let light = light_error(&shot.added(), &truth).expect("there is light").error;
         let seen = compare(&shot.rgb(), &truth, false).expect("sizes agree");
         let costs = session.count(&method, &camera).expect("counted");
-        let projected = total_ms(&costs, &GTX_1050, EFFICIENCY);
+        let projected = modelled(&costs, &GTX_1050).ms;
         (light, seen.display.psnr, projected, shot.settled)
     };
     let (direct, ambient) = (of(Method::Direct), of(Method::Ambient(Default::default())));

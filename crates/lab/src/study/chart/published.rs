@@ -4,7 +4,7 @@ use super::ChartError;
 use crate::network::convert::{self, Arch, Norm};
 use crate::study::{
     bench::{self, BenchOptions, Spread},
-    projection::{self, Cost, EFFICIENCY, GTX_1050},
+    projection::{Cost, GTX_1050, Modelled, modelled},
 };
 use bouncelight::gpu::{Gpu, timing::Recorder};
 use bouncelight::net::{
@@ -43,9 +43,9 @@ pub struct Generator {
 }
 
 impl Generator {
-    /// Milliseconds that a GTX 1050 would take by count: a projection.
-    pub fn projected_ms(&self) -> f64 {
-        projection::total_ms(&self.costs, &GTX_1050, EFFICIENCY)
+    /// What a GTX 1050 would take by the model; none where threads were not counted.
+    pub fn modelled(&self) -> Option<Modelled> {
+        self.costs.iter().all(Cost::has_threads).then(|| modelled(&self.costs, &GTX_1050))
     }
 
     /// Arithmetic, GFLOP.
@@ -79,8 +79,8 @@ pub(super) fn network(gpu: &Gpu, weights: &Weights, size: [u32; 2]) -> Result<Ne
 
 /// Counted cost of a network's steps.
 pub(super) fn costs(network: &Network) -> Vec<Cost> {
-    let cost = |row: bouncelight::net::plan::Row| Cost::new(&row.name, row.flops as f64, row.traffic as f64);
-    network.plan().rows().into_iter().map(cost).collect()
+    let plan = network.plan();
+    plan.steps.iter().zip(plan.rows()).map(|(step, row)| Cost::of_step(plan, step, &row.name)).collect()
 }
 
 /// Milliseconds of one run by the clock, waited for.

@@ -8,7 +8,7 @@ use super::{
 };
 use crate::study::{
     bench::AGREEMENT,
-    projection::{self, EFFICIENCY, GTX_1050},
+    projection::{GTX_1050, model, modelled},
     wrap::wrapped,
 };
 use std::fmt::Write;
@@ -35,8 +35,9 @@ pub fn csv(record: &Record) -> String {
             let score = |f: &dyn Fn(&Scores) -> Option<f64>| scores.as_ref().and_then(f);
             let gpu = time.as_ref().and_then(|t| t.gpu_ms);
             let wall = time.as_ref().map(|t| t.wall_ms);
-            let projected = (entry.map(|e| e.kind) != Some(Kind::Paths))
-                .then(|| projection::total_ms(&unit.costs, &GTX_1050, EFFICIENCY));
+            let whole = unit.costs.iter().all(|c| c.has_threads());
+            let projected =
+                (whole && entry.map(|e| e.kind) != Some(Kind::Paths)).then(|| modelled(&unit.costs, &GTX_1050).ms);
             let numbers = [
                 score(&|s| s.light),
                 score(&|s| s.light_bias),
@@ -107,9 +108,10 @@ pub fn table(record: &Record, metric: Metric) -> String {
     }
     let _ = writeln!(
         text,
-        "* projected for a {} at {:.0} % of its peaks, of what finds and adds indirect light; never measured",
+        "* modelled for a {}, of what finds and adds indirect light; never measured: {} times it to {} times it",
         GTX_1050.name,
-        EFFICIENCY * 100.0
+        model().spread[0],
+        model().spread[1]
     );
     text
 }
@@ -123,7 +125,7 @@ fn standing(row: &Row) -> String {
         (Kind::Paths, _) => {}
         _ => {
             words.extend(row.best.then(|| "measured".to_owned()));
-            words.extend(row.best_projected.then(|| "projected".to_owned()));
+            words.extend(row.best_projected.then(|| "modelled".to_owned()));
         }
     }
     words.join(", ")
@@ -146,7 +148,7 @@ pub fn page(record: &Record, metric: Metric, picture: &str) -> String {
         &format!("Device: **{}**. Commit {}, program {}, {}.\n", record.device.sentence(), p.commit, p.program, p.date),
     );
     if record.device.software {
-        let cpu = "These times are a CPU driver's and say nothing of a GPU beyond ratios of like work; the column for a GTX 1050 is a projection by count, which nobody has measured.";
+        let cpu = "These times are a CPU driver's and say nothing of a GPU beyond ratios of like work; the column for a GTX 1050 is modelled from counts, which nobody has measured.";
         add(&mut text, &format!("{cpu}\n"));
     }
     add(&mut text, &format!("![error against time]({picture})\n"));
@@ -194,7 +196,7 @@ fn how(record: &Record, metric: Metric) -> String {
          camera on, {} samples \
          a pixel; the first frame has one. Time: a whole frame, rasteriser included, median of {frames} frames after \
          {warmup}; {}. \
-         Counted (GFLOP, MB, rays) and projected{waiting}: only the passes that find and add indirect light. \
+         Counted (GFLOP, MB, rays) and modelled{waiting}: only the passes that find and add indirect light. \
          \"Against paths\": how many times as long our path tracer takes to come as near on this device.{}\n",
         record.sound_scenes(),
         record.samples,
@@ -219,7 +221,7 @@ fn how(record: &Record, metric: Metric) -> String {
 fn main_table(record: &Record, metric: Metric) -> String {
     let mut text = format!(
         "| | error, settled | first frame | frame, ms | clock, ms | GFLOP | MB | Mray | GPU memory, MiB | {} ms, \
-         **projected** | against paths |\n|{}\n",
+         **modelled** | against paths |\n|{}\n",
         GTX_1050.name,
         "---|".repeat(11)
     );
@@ -271,7 +273,7 @@ fn frontiers(record: &Record, metric: Metric) -> String {
         words.collect::<Vec<_>>().join(" → ")
     };
     format!(
-        "- Frontier as measured here: {}\n- Frontier by projection for a {}, not measured: {}\n",
+        "- Frontier as measured here: {}\n- Frontier as modelled for a {}, not measured: {}\n",
         list(|r| r.best, |r| r.ms.map(|b| b.mean)),
         GTX_1050.name,
         list(|r| r.best_projected, |r| r.projected_ms)
@@ -281,6 +283,7 @@ fn frontiers(record: &Record, metric: Metric) -> String {
 fn generator(record: &Record) -> String {
     let Some(g) = &record.generator else { return String::new() };
     let [w, h] = g.size;
+    let modelled = g.modelled().map_or("no, as its threads were not counted".into(), |m| format!("{m:.0} ms"));
     let ran = match (&g.wall_ms, &g.failed) {
         (Some(ms), _) => format!("takes {:.1} ms here by the clock", ms.median),
         (None, Some(why)) => format!("was not run: {why}"),
@@ -289,13 +292,12 @@ fn generator(record: &Record) -> String {
     format!(
         "**The paper's generator** ({} parameters, group norm, numbers nobody trained) at {w}×{h} {ran}, the raster \
          before it not counted; \
-         {:.1} GFLOP by count; projected for a {}: {:.1} ms. Printed by its authors: {PRINTED_MS:.0} ms on that card \
+         {:.1} GFLOP by count; modelled for a {}: {modelled}. Printed by its authors: {PRINTED_MS:.0} ms on that card \
          at 1024×512, by a clock that \
          did not wait for the GPU, and L1 {PRINTED_L1:.0} on their own 375 pictures.\n",
         g.parameters,
         g.gflop(),
-        GTX_1050.name,
-        g.projected_ms()
+        GTX_1050.name
     )
 }
 

@@ -3,7 +3,7 @@
 use super::{Kind, Metric, Record, Unit};
 use crate::study::{
     bench::{self, Spread},
-    projection::{self, EFFICIENCY, GTX_1050},
+    projection::{Cost, GTX_1050, modelled},
 };
 
 /// Mean over scenes, and the scenes that are best and worst.
@@ -77,7 +77,7 @@ pub struct Row {
     pub cold_ms: Option<Bars>,
     /// The synchronised clock beside timestamps, mean milliseconds.
     pub wall_ms: Option<f64>,
-    /// Projected milliseconds of its own passes on a GTX 1050; absent where nothing is counted.
+    /// Modelled milliseconds of its own passes on a GTX 1050; absent where threads were not counted.
     pub projected_ms: Option<f64>,
     /// Counted arithmetic, GFLOP.
     pub gflop: f64,
@@ -134,7 +134,7 @@ pub fn rows(record: &Record, metric: Metric) -> Vec<Row> {
             };
             let mean =
                 |f: &dyn Fn(&Unit) -> f64| units.iter().map(|u| f(u)).sum::<f64>() / units.len().max(1) as f64 + 0.0;
-            let counted = |f: fn(&crate::study::projection::Cost) -> f64| mean(&|u| u.costs.iter().map(f).sum::<f64>());
+            let counted = |f: fn(&Cost) -> f64| mean(&|u| u.costs.iter().map(f).sum::<f64>());
             let wall: Vec<&Spread> = units.iter().filter_map(|u| Some(&u.time.as_ref()?.wall_ms)).collect();
             let judged = units.iter().filter(|u| u.scores.as_ref().is_some_and(|s| metric.of(s).is_some())).count();
             Row {
@@ -147,8 +147,9 @@ pub fn rows(record: &Record, metric: Metric) -> Vec<Row> {
                 ms: time(false),
                 cold_ms: time(true),
                 wall_ms: (!wall.is_empty()).then(|| wall.iter().map(|s| s.median).sum::<f64>() / wall.len() as f64),
-                projected_ms: (entry.kind != Kind::Paths)
-                    .then(|| mean(&|u| projection::total_ms(&u.costs, &GTX_1050, EFFICIENCY))),
+                projected_ms: (entry.kind != Kind::Paths
+                    && units.iter().all(|u| u.costs.iter().all(Cost::has_threads)))
+                .then(|| mean(&|u| modelled(&u.costs, &GTX_1050).ms)),
                 gflop: counted(|c| c.flops) / 1e9,
                 mb: counted(|c| c.bytes) / 1e6,
                 rays: counted(|c| c.rays),

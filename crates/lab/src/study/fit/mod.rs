@@ -25,7 +25,7 @@ pub use views::covering;
 
 use super::{
     count::CountError,
-    projection::{self, EFFICIENCY, GTX_1050},
+    projection::{GTX_1050, modelled},
     session::{Frame, Session, SessionError, Settling},
     truth::Reference,
 };
@@ -59,7 +59,7 @@ pub struct FitOptions {
     pub networks: Vec<Network>,
     /// Most samples a pixel of a reference.
     pub max_samples: u32,
-    /// Costs are measured on this device; else projected from counted work.
+    /// Costs are measured on this device; else modelled from counted work.
     pub timed: bool,
 }
 
@@ -365,7 +365,7 @@ impl Search<'_, '_> {
             return Ok(Some((measured.wall_ms.median - bare.wall_ms.median).max(0.0)));
         }
         match self.session.count(&method, &camera) {
-            Ok(costs) => Ok(Some(projection::total_ms(&costs, &GTX_1050, EFFICIENCY))),
+            Ok(costs) => Ok(Some(modelled(&costs, &GTX_1050).ms)),
             Err(SessionError::Count(CountError::Fallback(_))) => Ok(None),
             Err(e) => Err(e.into()),
         }

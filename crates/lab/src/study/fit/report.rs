@@ -46,7 +46,7 @@ impl Fit {
             FittedWeights { file: network.file.clone(), hash: network.neural.weights.hash_text() }
         });
         let [gather, ambient_term] = row.candidate.numbers();
-        let cost = if options.timed { "measured on this device" } else { "projected for a GTX 1050, not measured" };
+        let cost = if options.timed { "measured on this device" } else { "modelled for a GTX 1050, not measured" };
         Fitted {
             schema: SCHEMA,
             program: env!("CARGO_PKG_VERSION").into(),
@@ -101,7 +101,7 @@ impl Fit {
     fn write_table(&self, options: &FitOptions, out: &mut String) -> std::fmt::Result {
         let quality_target = &options.quality_target;
         let views: String = (0..self.views.len()).map(|i| format!(" view {i} |")).collect();
-        let ms = if options.timed { "ms, measured" } else { "GTX 1050 ms, projected" };
+        let ms = if options.timed { "ms, measured" } else { "GTX 1050 ms, modelled" };
         writeln!(out, "| method | {} in{views} {ms} | |", quality_target.name())?;
         writeln!(out, "|---|{}---|---|", "---|".repeat(self.views.len()))?;
         for (i, row) in self.rows.iter().enumerate() {

@@ -1,10 +1,10 @@
 //! Whole frames of every method.
 
-use super::{Projected, Run};
+use super::Run;
 use crate::study::{
     bench::{BenchError, BenchOptions, Measurement, measure},
     count,
-    projection::{Card, is_indirect},
+    projection::is_indirect,
 };
 use bouncelight::gi::{Method, Neural, name::MethodName};
 use bouncelight::gpu::Gpu;
@@ -41,8 +41,6 @@ pub struct FrameRow {
     pub own_ms: f64,
     /// How `own_ms` was found.
     pub timing: Timing,
-    /// Beside it; none where nothing is counted.
-    pub projected: Option<Projected>,
 }
 
 /// Where the time of a method's own passes comes from.
@@ -57,14 +55,14 @@ pub enum Timing {
 }
 
 /// All real-time methods in `scene` at `size`.
-pub(super) fn methods(run: &mut Run<'_>, scene: &(String, Scene), size: [u32; 2], card: &Card) -> Vec<FrameRow> {
-    rows(run, scene, size, card, MethodName::REAL_TIME, Precision::F32)
+pub(super) fn methods(run: &mut Run<'_>, scene: &(String, Scene), size: [u32; 2]) -> Vec<FrameRow> {
+    rows(run, scene, size, MethodName::REAL_TIME, Precision::F32)
 }
 
 /// The network in 16 bits.
-pub(super) fn half_precision(run: &mut Run<'_>, scene: &(String, Scene), size: [u32; 2], card: &Card) -> Vec<FrameRow> {
+pub(super) fn half_precision(run: &mut Run<'_>, scene: &(String, Scene), size: [u32; 2]) -> Vec<FrameRow> {
     // `direct` gives the clock something to be compared with.
-    let mut rows = rows(run, scene, size, card, &[MethodName::Direct, MethodName::Neural], Precision::F16);
+    let mut rows = rows(run, scene, size, &[MethodName::Direct, MethodName::Neural], Precision::F16);
     rows.retain(|r| r.measured.method == MethodName::Neural.name());
     rows
 }
@@ -73,7 +71,6 @@ fn rows(
     run: &mut Run<'_>,
     (name, scene): &(String, Scene),
     size: [u32; 2],
-    card: &Card,
     methods: &[MethodName],
     precision: Precision,
 ) -> Vec<FrameRow> {
@@ -113,7 +110,6 @@ fn rows(
             triangles: triangles(scene),
             precision: label(precision).into(),
             frames,
-            projected: Projected::of(&measured.costs, own_ms, card),
             own_ms,
             timing,
             measured,
@@ -179,6 +175,7 @@ mod tests {
             wall_ms: at(4.6),
             bytes: Vec::new(),
             costs: Vec::new(),
+            modelled: Default::default(),
             drawn: Default::default(),
         };
         assert_eq!(own(&m, 3.0), (1.5, Timing::Timestamps));

@@ -2,21 +2,20 @@
 //! device at hand within a given time: frames of every method by size, the network's layers as
 //! tuned and not, rays by kind, the path tracer, in both precisions.
 //!
-//! Beside each measured time stands the projection of the same counted work: once for this device,
-//! by the peaks that it was measured to have and the efficiency that [`projection`] assumes, so
-//! that the ratio of the two tells how good that assumption is; and once for the target card, as
-//! assumed and as this device reached. What did not fit into the time, or failed, is listed.
+//! Beside each measured time stands what the model ([`projection`](super::projection)) says of the
+//! same counted work, for this device, where its data sheet is known, and for the target cards. What
+//! did not fit into the time, or failed, is listed.
 
 mod frames;
 mod network;
 mod parts;
+mod share;
 mod table;
 
 pub use frames::FrameRow;
 pub use network::NetworkRow;
 pub use parts::{RayRow, TracerRow};
 
-use super::projection::{self, Card, Cost, EFFICIENCY, GTX_1050};
 use crate::network::peak;
 use bouncelight::gpu::Gpu;
 use bouncelight::net::format::{Weights, WeightsError};
@@ -153,20 +152,19 @@ pub fn measure(
     let load = std::fs::read_to_string("/proc/loadavg").ok().and_then(|t| t.split(' ').next()?.parse().ok());
     told("the device's peaks");
     let peak = peak::measure(&gpu.device, &gpu.queue);
-    let card = Card { name: "this device", flops: peak.flops, bandwidth: peak.bytes };
     let mut run = Run { gpu, weights: &weights, until: started + options.time, told, left_out: Vec::new() };
 
     // What matters most comes first: where time runs out, it is the rest that lacks.
     let mut network = network::untuned(&mut run, *size, peak);
-    let mut frames = frames::methods(&mut run, usual, *size, &card);
+    let mut frames = frames::methods(&mut run, usual, *size);
     let rays = parts::rays(&mut run, options);
     for scene in &options.scenes[1..] {
-        frames.extend(frames::methods(&mut run, scene, *size, &card));
+        frames.extend(frames::methods(&mut run, scene, *size));
     }
     for other in options.sizes.iter().filter(|s| *s != size) {
-        frames.extend(frames::methods(&mut run, usual, *other, &card));
+        frames.extend(frames::methods(&mut run, usual, *other));
     }
-    frames.extend(frames::half_precision(&mut run, usual, *size, &card));
+    frames.extend(frames::half_precision(&mut run, usual, *size));
     let tracer = options.scenes.iter().filter_map(|scene| parts::tracer(&mut run, scene)).collect();
     network.extend(network::tuned(&mut run, *size, peak));
 
@@ -201,51 +199,5 @@ impl HardwareReport {
         let words = self.adapter.split(|c: char| !c.is_ascii_alphanumeric()).filter(|w| !w.is_empty());
         let name = words.collect::<Vec<_>>().join("-").to_ascii_lowercase();
         if name.is_empty() { "device".into() } else { name }
-    }
-}
-
-/// What counted work would take, and what it took: milliseconds.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct Projected {
-    /// By this device's measured peaks at [`EFFICIENCY`].
-    pub here_ms: f64,
-    /// Measured time over that: above 1 the projection was too hopeful.
-    pub ratio: f64,
-    /// By the target card's peaks at [`EFFICIENCY`], as the documentation has it.
-    pub gtx_1050_ms: f64,
-    /// The same at the efficiency that this device reached.
-    pub gtx_1050_as_here_ms: f64,
-}
-
-impl Projected {
-    /// Of `costs` that took `measured` milliseconds on a device with the peaks of `card`; none
-    /// where nothing was counted or timed.
-    fn of(costs: &[Cost], measured: f64, card: &Card) -> Option<Self> {
-        let here_ms = projection::total_ms(costs, card, EFFICIENCY);
-        let gtx_1050_ms = projection::total_ms(costs, &GTX_1050, EFFICIENCY);
-        let ratio = measured / here_ms;
-        (here_ms > 0.0 && ratio > 0.0 && ratio.is_finite()).then_some(Self {
-            here_ms,
-            ratio,
-            gtx_1050_ms,
-            gtx_1050_as_here_ms: gtx_1050_ms * ratio,
-        })
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_projection_is_set_against_what_was_measured() {
-        let card = Card { name: "test", flops: 1e12, bandwidth: 1e12 };
-        let costs = [Cost::new("a", 0.35e9, 0.0), Cost::new("b", 0.0, 0.35e9)];
-        // Two passes of 1 ms at 35 % of the peak took 4 ms together.
-        let p = Projected::of(&costs, 4.0, &card).unwrap();
-        assert!((p.here_ms - 2.0).abs() < 1e-9 && (p.ratio - 2.0).abs() < 1e-9, "{p:?}");
-        assert!((p.gtx_1050_as_here_ms / p.gtx_1050_ms - 2.0).abs() < 1e-9);
-        assert_eq!(Projected::of(&[], 4.0, &card), None, "nothing counted, nothing to divide by");
-        assert_eq!(Projected::of(&costs, f64::NAN, &card), None);
     }
 }

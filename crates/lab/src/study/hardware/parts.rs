@@ -2,6 +2,7 @@
 
 use super::{HardwareOptions, Run};
 use crate::reference::{Kernel, ReferenceScene, Subject, Tracer, TracerOptions};
+use crate::study::projection::Cost;
 use crate::study::rays::{RayScene, RayTest};
 use bouncelight::accel::RayCaster;
 use bouncelight::scene::Scene;
@@ -29,6 +30,9 @@ pub struct RayRow {
     pub visits: [f64; 3],
     /// Million rays a second of the same kinds.
     pub mrays: [f64; 3],
+    /// What the kernel of each kind does, where somebody has counted it.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub costs: Vec<Cost>,
 }
 
 /// The path tracer in one scene.
@@ -76,6 +80,7 @@ pub(super) fn rays(run: &mut Run<'_>, options: &HardwareOptions) -> Vec<RayRow> 
             build_s: test.build,
             visits: test.visits,
             mrays: test.nanoseconds.map(|ns| 1e3 / ns),
+            costs: Vec::new(),
         });
     }
     rows

@@ -1,11 +1,11 @@
 //! The record as Markdown.
 
-use super::{FrameRow, HardwareReport, frames::Timing};
-use crate::study::projection::{EFFICIENCY, GTX_1050};
+use super::{FrameRow, HardwareReport};
+use crate::study::projection::{Card, GTX_1050, GTX_1650, modelled};
 use std::fmt::Write;
 
 impl HardwareReport {
-    /// The tables of `docs/measured/DEVICE.md`. Projections are marked as such.
+    /// The tables of `docs/measured/DEVICE.md`. What is modelled is marked as such.
     pub fn markdown(&self) -> String {
         let mut text = String::new();
         // Writing into a text cannot fail.
@@ -50,6 +50,7 @@ impl HardwareReport {
             self.peak_bytes / 1e9
         )?;
         self.write_frames(out)?;
+        self.write_shares(out)?;
         self.write_passes(out)?;
         self.write_network(out)?;
         self.write_rays(out)?;
@@ -61,53 +62,49 @@ impl HardwareReport {
     }
 
     fn write_frames(&self, out: &mut String) -> std::fmt::Result {
-        let share = EFFICIENCY * 100.0;
+        let here = Card::of_adapter(&self.adapter);
         writeln!(out, "## Methods\n")?;
         writeln!(
             out,
-            "Milliseconds; medians. *Own*: the passes that find and add indirect light{}. *Projected here*: the \
-             counted work at {share:.0} % of this device's measured peaks, and *measured / projected* what that \
-             assumption is worth. \
-             The last two columns are projections for a {}: as the documentation assumes, and with the efficiency \
-             that this device reached.\n",
-            if self.frames.iter().any(|r| r.timing == Timing::Clock) {
+            "Milliseconds; medians. The last columns are modelled, not measured, with a range that eight of ten passes \
+             kept to that the model had not seen. *Own*: the passes that find and add indirect light{}. *Measured / \
+             modelled*: own passes over what the model says of this device{}.\n",
+            if self.frames.iter().any(|r| r.measured.own_ms().is_none()) {
                 ", by their timestamps; with `~` by the synchronised clock less that of `direct`, where timestamps \
                  are missing or do not agree with it"
             } else {
                 ", by their timestamps, which agree with the synchronised clock within 10 %"
             },
-            GTX_1050.name
+            if here.is_some() { "" } else { ", whose data sheet is not known" }
         )?;
         writeln!(
             out,
-            "| scene | size | method | own, median | all passes | p95 | clock | MiB | projected here | **measured / \
-             projected** | {0}, projected | {0} as here, projected |",
-            GTX_1050.name
+            "| scene | size | method | own, median | all passes | p95 | clock | MiB | **measured / modelled** | {}, \
+             modelled | {}, modelled |",
+            GTX_1050.name, GTX_1650.name
         )?;
-        writeln!(out, "|---|---|---|---|---|---|---|---|---|---|---|---|")?;
+        writeln!(out, "|---|---|---|---|---|---|---|---|---|---|---|")?;
         for r in &self.frames {
             let m = &r.measured;
             let time = |t: Option<f64>| t.map_or("-".into(), |t| format!("{t:.2}"));
-            let [here, gtx, as_here] = [
-                r.projected.map(|p| p.here_ms),
-                r.projected.map(|p| p.gtx_1050_ms),
-                r.projected.map(|p| p.gtx_1050_as_here_ms),
-            ]
-            .map(time);
+            let counted = m.costs.iter().any(|c| c.dispatches > 0.0);
+            let of = |card: &Card| if counted { modelled(&m.costs, card).to_string() } else { "-".into() };
+            let (mark, own) = m.own_ms().map_or(("~", r.own_ms), |ms| ("", ms));
+            let ratio = here.filter(|_| counted).map(|card| own / modelled(&m.costs, &card).ms);
             let method = if r.precision == "f32" { m.method.clone() } else { format!("{}, {}", m.method, r.precision) };
             writeln!(
                 out,
-                "| {} | {}x{} | `{method}` | {}{:.2} | {} | {} | {:.2} | {:.0} | {here} | {} | {gtx} | {as_here} |",
+                "| {} | {}x{} | `{method}` | {mark}{own:.2} | {} | {} | {:.2} | {:.0} | {} | {} | {} |",
                 r.scene,
                 r.size[0],
                 r.size[1],
-                if r.timing == Timing::Clock { "~" } else { "" },
-                r.own_ms,
                 time(m.gpu_ms.map(|t| t.median)),
                 time(m.gpu_ms.map(|t| t.p95)),
                 m.wall_ms.median,
                 m.total_bytes() as f64 / f64::from(1 << 20),
-                r.projected.map_or("-".into(), |p| format!("**{:.2}**", p.ratio)),
+                ratio.filter(|r| *r > 0.0).map_or("-".into(), |r| format!("**{r:.2}**")),
+                of(&GTX_1050),
+                of(&GTX_1650),
             )?;
         }
         Ok(())
@@ -131,7 +128,7 @@ impl HardwareReport {
         writeln!(out, "\n## Passes\n")?;
         writeln!(
             out,
-            "{}, {}x{}: median milliseconds by timestamps, and in brackets the {} by count, projected.\n",
+            "{}, {}x{}: median milliseconds by timestamps, and in brackets what a {} is modelled to take.\n",
             first.scene, first.size[0], first.size[1], GTX_1050.name
         )?;
         writeln!(
@@ -143,7 +140,7 @@ impl HardwareReport {
         for pass in passes {
             let cell = |r: &&FrameRow| {
                 let cost = r.measured.costs.iter().find(|c| c.pass == pass);
-                let projected = cost.map(|c| crate::study::projection::pass_ms(c, &GTX_1050, EFFICIENCY));
+                let projected = cost.map(|c| modelled([c], &GTX_1050).ms);
                 let measured = r.measured.passes.iter().find(|p| p.pass == pass);
                 measured.map_or("".into(), |p| match projected {
                     Some(projected) => format!("{:.3} ({projected:.2})", p.ms.median),
