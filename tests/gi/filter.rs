@@ -4,8 +4,8 @@
 use crate::common;
 use crate::linear::linear_bytes;
 use crate::weights::{constant_filter, random_filter};
-use crate::world::{BACKWARDS, difference, gather, hall, light, mean, renderer, sun};
-use bouncelight::gi::{GiError, Method, Neural};
+use crate::world::{BACKWARDS, difference, hall, light, mean, renderer, sun};
+use bouncelight::gi::{GiError, Method, Neural, gather::Options};
 use bouncelight::gpu::Gpu;
 use bouncelight::net::format::{CELLS_V1, CELLS_V2, FeatureRow, IMAGES_V1, Weights};
 use bouncelight::net::gpu::LayerReadback;
@@ -15,6 +15,11 @@ use bouncelight::scene::Scene;
 use bouncelight_lab::network::cpu;
 
 const SIZE: [u32; 2] = [96, 64];
+
+/// With the cache of `neural`'s.
+fn gather() -> Method {
+    Method::Gather(Options::default())
+}
 
 fn room(factor: f32) -> Scene {
     hall([0.8, 0.1, 0.1], &[sun(BACKWARDS, 3.0 * factor)], 0.2 * factor, 1.0)

@@ -65,7 +65,9 @@ fn the_slider_says_how_many_rays_are_sent() {
     let [all, third, again, undone] = rays[..] else { panic!("{rays:?}") };
     let [w, h] = [0, 1].map(|i| told[0]["/size"][i].as_u64().expect("pixels").div_ceil(4));
     let share = (w * h) as f64 / 3.0;
-    assert!([third, again].iter().all(|n| (0.85 * share..1.15 * share).contains(n)), "{rays:?} of {share}");
+    assert!((0.85 * share..1.15 * share).contains(&third), "{rays:?} of {share}");
+    // A method that has just been made limits nothing until its histories are long.
+    assert!(again > third, "{rays:?}");
     assert!(all > 1.5 * share && undone > 1.5 * share, "{rays:?} of {share}");
     let csv = std::fs::read_to_string(dir.path().join("timing-0001.csv")).expect("it was written");
     assert!(csv.lines().skip(1).all(|row| row.ends_with(&format!(",{third},0.33333334"))), "{csv}");
