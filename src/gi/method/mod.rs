@@ -106,7 +106,7 @@ impl Method {
         if self.has_history() { Self::SETTLED } else { 1 }
     }
 
-    /// Frames of a still camera after which a frame does no more than all later ones: what it costs
+    /// Frames of a still camera after which a frame does no more than later ones, until it rests: what it costs
     /// is counted then. (Cells with a short history send more rays.)
     pub fn frames_to_rest(&self) -> u32 {
         if self.has_history() { Self::SETTLED + 16 } else { 1 }
