@@ -73,7 +73,7 @@ impl Extent {
         }
         // Of a huge scene not all triangles are met.
         let whole = if reach.is_infinite() && all.size() < 1.1 * core.size() { all } else { core };
-        Some(strays::cut(core, near()).unwrap_or(whole))
+        Some(strays::cut([core.low, core.high], near()).map_or(whole, |[low, high]| Self { low, high }))
     }
 
     /// Without flat things that reach far beyond all others, as the floor and the wall behind a

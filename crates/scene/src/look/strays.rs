@@ -1,7 +1,6 @@
 //! Few small things that lie apart from a scene: a forgotten vertex, a helper object beside the
 //! model. They would take most of the picture.
 
-use super::extent::Extent;
 use glam::Vec3;
 
 /// Share of the triangles, and of their area, that may lie apart on one side.
@@ -21,8 +20,9 @@ struct Patch {
     area: f32,
 }
 
-/// What is left of `core`, the box around `triangles`, without strays; `None` where there are none.
-pub fn cut(core: Extent, triangles: impl Iterator<Item = [Vec3; 3]>) -> Option<Extent> {
+/// What is left of `core`, the lowest and highest corner of the box around `triangles`, without strays;
+/// `None` where there are none.
+pub fn cut(core: [Vec3; 2], triangles: impl Iterator<Item = [Vec3; 3]>) -> Option<[Vec3; 2]> {
     let patch = |[a, b, c]: [Vec3; 3]| Patch {
         low: a.min(b).min(c),
         high: a.max(b).max(c),
@@ -32,21 +32,20 @@ pub fn cut(core: Extent, triangles: impl Iterator<Item = [Vec3; 3]>) -> Option<E
     let mut rest = core;
     for _ in 0..ROUNDS {
         let ends = |up: bool| Vec3::from([0, 1, 2].map(|axis| inner(&patches, axis, up)));
-        let inner = Extent { low: -ends(false), high: ends(true) };
-        let (low, high) = (inner.low.max(rest.low), inner.high.min(rest.high));
+        let (low, high) = ((-ends(false)).max(rest[0]), ends(true).min(rest[1]));
         let worth = Vec3::splat(LONGER * low.distance(high));
         // Only the sides where it is worth it.
-        let low = Vec3::select((low - rest.low).cmpge(worth), low, rest.low);
-        let high = Vec3::select((rest.high - high).cmpge(worth), high, rest.high);
+        let low = Vec3::select((low - rest[0]).cmpge(worth), low, rest[0]);
+        let high = Vec3::select((rest[1] - high).cmpge(worth), high, rest[1]);
         let before = patches.len();
         patches.retain(|p| p.low.cmpge(low).all() && p.high.cmple(high).all());
         if patches.len() == before || patches.is_empty() {
             break;
         }
-        let empty = Extent { low: Vec3::INFINITY, high: Vec3::NEG_INFINITY };
-        rest = patches.iter().fold(empty, |b, p| Extent { low: b.low.min(p.low), high: b.high.max(p.high) });
+        let empty = [Vec3::INFINITY, Vec3::NEG_INFINITY];
+        rest = patches.iter().fold(empty, |[low, high], p| [low.min(p.low), high.max(p.high)]);
     }
-    (rest.low != core.low || rest.high != core.high).then_some(rest)
+    (rest != core).then_some(rest)
 }
 
 /// Where the scene ends along an axis (its negative where not `up`) without the few small things
