@@ -12,7 +12,7 @@ use super::{
     stdout::say,
 };
 use anyhow::{Context, Result};
-use bouncelight::gi::inputs::cells_of;
+use bouncelight::gi::{gather, inputs::cells_of};
 use bouncelight::scene::{self, Camera, LightKind, Scene};
 use bouncelight_lab::scenes::{home, paper_room};
 use bouncelight_lab::study::{
@@ -69,6 +69,10 @@ pub struct Args {
     /// Weights of a network that filters, whose light is written, too.
     #[arg(long, value_name = "FILE", help_heading = SAMPLES)]
     weights: Option<PathBuf>,
+    /// Constants of gather whose histories are written, such as rays=0.5 or rays=4000 [default:
+    /// its own].
+    #[arg(long, value_name = "LIST", help_heading = SAMPLES)]
+    gather: Option<gather::Options>,
     /// Folder to write; samples that exist are kept, so a stopped run resumes.
     #[arg(long, value_name = "DIR", help_heading = SAMPLES)]
     out: PathBuf,
@@ -90,6 +94,7 @@ pub const EXAMPLES: &str = "\
 Examples:
   bouncelight dataset --rooms 2-9 --spp 256 --moments 1,2,8,pan --out data
   bouncelight dataset --recipe home --rooms 0-99 --spp 256 --moments 1,8 --out data --shard 0/4
+  bouncelight dataset --recipe home --rooms 0-99 --spp 16 --moments 1,8 --gather rays=4000 --out data
   bouncelight dataset --recipe scene --scene scene.glb --spp 256 --moments 1,8,20 --out data";
 
 #[derive(Debug, Clone, Copy, PartialEq, clap::ValueEnum)]

@@ -45,10 +45,13 @@ pub(super) struct Uploaded<'a> {
 impl Writer {
     /// What `args` ask for, before anything is drawn; reads what the folder has.
     pub(super) fn open(gpu: Gpu, args: &Args) -> Result<Self> {
-        let method = match &args.weights {
+        let mut method = match &args.weights {
             Some(path) => Method::Neural(Box::new(load_weights(Some(path))?.into())),
             None => Method::Gather(gather::Options::default()),
         };
+        if let (Some(options), Some(asked)) = (method.gather_mut(), args.gather) {
+            *options = asked;
+        }
         // Of its own seed: the noise of what is to be learnt must not be that of what it is learnt
         // from, or a cell's own few rays would seem to know more than its neighbours'.
         let plain = Method::Gather(gather::Options { seed: 1, ..gather::Options::PLAIN });
