@@ -3,7 +3,7 @@
 
 use crate::common;
 use crate::gather::{go_on, uploaded};
-use crate::world::{self, GREY, difference, mean};
+use crate::world::{self, GREY, HALF_CEILING, difference, mean};
 use bouncelight::gi::{Method, gather::Options, gather::RAYS_SENT};
 use bouncelight::gpu::{Gpu, readback};
 use bouncelight::render::Renderer;
@@ -14,15 +14,7 @@ const CELLS: f64 = 32.0 * 24.0;
 
 /// A room with half a ceiling under a sky, and a lamp.
 fn room(intensity: f32) -> Scene {
-    let blocks = [
-        ([-6.0, -0.2, -6.0], [6.0, 0.0, 6.0], GREY),
-        ([-6.2, 0.0, -6.0], [-6.0, 4.0, 6.0], GREY),
-        ([6.0, 0.0, -6.0], [6.2, 4.0, 6.0], GREY),
-        ([-6.0, 0.0, -6.2], [6.0, 4.0, -6.0], GREY),
-        ([-6.0, 0.0, 6.0], [6.0, 4.0, 6.2], GREY),
-        ([-6.2, 4.0, -6.2], [0.0, 4.2, 6.2], GREY),
-        ([-1.0, 0.0, -2.0], [1.0, 1.5, -1.0], GREY),
-    ];
+    let blocks = world::room(&[HALF_CEILING, ([-1.0, 0.0, -2.0], [1.0, 1.5, -1.0], GREY)]);
     let mut scene = world::scene(&blocks, &[], 1.0, Camera::look_at([0.0, 1.6, 5.0], [0.0, 1.0, -3.0], 1.0));
     scene.lights = vec![LightKind::Point { position: [1.5, 2.0, 0.5], intensity, radius: 0.05, range: None }.into()];
     scene

@@ -3,7 +3,7 @@
 
 use crate::common;
 use crate::gather::{go_on, uploaded};
-use crate::world::{self, GREY, difference};
+use crate::world::{self, GREY, HALF_CEILING, difference};
 use bouncelight::gi::gather::HISTORY;
 use bouncelight::gpu::{Gpu, readback};
 use bouncelight::render::Renderer;
@@ -37,16 +37,8 @@ fn begun_anew(gpu: &Gpu, scene: &Scene, moved: Option<usize>) -> f64 {
 #[test]
 fn cells_whose_light_is_another_begin_anew_and_no_others() {
     let Some(gpu) = common::gpu() else { return };
-    let blocks = [
-        ([-6.0, -0.2, -6.0], [6.0, 0.0, 6.0], GREY),
-        ([-6.2, 0.0, -6.0], [-6.0, 4.0, 6.0], GREY),
-        ([6.0, 0.0, -6.0], [6.2, 4.0, 6.0], GREY),
-        ([-6.0, 0.0, -6.2], [6.0, 4.0, -6.0], GREY),
-        ([-6.0, 0.0, 6.0], [6.0, 4.0, 6.2], GREY),
-        // Half a ceiling, and what stands behind the wall, where nobody inside sees it.
-        ([-6.2, 4.0, -6.2], [0.0, 4.2, 6.2], GREY),
-        ([-3.0, 0.0, -12.0], [3.0, 1.0, -10.0], GREY),
-    ];
+    // What stands behind the wall nobody inside sees.
+    let blocks = world::room(&[HALF_CEILING, ([-3.0, 0.0, -12.0], [3.0, 1.0, -10.0], GREY)]);
     let camera = Camera::look_at([0.0, 1.6, 5.0], [0.0, 1.0, -3.0], 1.0);
     let scene = world::scene(&blocks, &[], 1.0, camera);
     let [ceiling, behind, none] = [Some(5), Some(6), None].map(|moved| begun_anew(&gpu, &scene, moved));

@@ -84,16 +84,27 @@ pub(crate) fn gather() -> Method {
 
 pub(crate) const GREY: [f32; 3] = [0.5; 3];
 
-/// A floor, an open top and four walls; the one behind the camera has a colour of its own.
+/// A floor and four walls; the last of them is that behind the camera.
+const WALLS: [Block; 5] = [
+    ([-6.0, -0.2, -6.0], [6.0, 0.0, 6.0], GREY),
+    ([-6.2, 0.0, -6.0], [-6.0, 4.0, 6.0], GREY),
+    ([6.0, 0.0, -6.0], [6.2, 4.0, 6.0], GREY),
+    ([-6.0, 0.0, -6.2], [6.0, 4.0, -6.0], GREY),
+    ([-6.0, 0.0, 6.0], [6.0, 4.0, 6.2], GREY),
+];
+
+/// Half a ceiling over them.
+pub(crate) const HALF_CEILING: Block = ([-6.2, 4.0, -6.2], [0.0, 4.2, 6.2], GREY);
+
+/// A room with an open top and what stands in it or above.
+pub(crate) fn room(with: &[Block]) -> Vec<Block> {
+    [&WALLS[..], with].concat()
+}
+
+/// [`room`] with a box in it; the wall behind the camera has a colour of its own.
 pub(crate) fn hall(behind: [f32; 3], lights: &[LightKind], sky: f32, yfov: f32) -> Scene {
-    let blocks = [
-        ([-6.0, -0.2, -6.0], [6.0, 0.0, 6.0], GREY),
-        ([-6.2, 0.0, -6.0], [-6.0, 4.0, 6.0], GREY),
-        ([6.0, 0.0, -6.0], [6.2, 4.0, 6.0], GREY),
-        ([-6.0, 0.0, -6.2], [6.0, 4.0, -6.0], GREY),
-        ([-6.0, 0.0, 6.0], [6.0, 4.0, 6.2], behind),
-        ([-1.0, 0.0, -3.0], [1.0, 1.5, -1.0], GREY),
-    ];
+    let mut blocks = room(&[([-1.0, 0.0, -3.0], [1.0, 1.5, -1.0], GREY)]);
+    blocks[4].2 = behind;
     scene(&blocks, lights, sky, Camera::look_at([0.0, 1.6, 3.0], [0.0, 0.6, -3.0], yfov))
 }
 

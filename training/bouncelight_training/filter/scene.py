@@ -15,7 +15,7 @@ import subprocess
 import sys
 
 from ..errors import TrainingError, reported
-from ..weights import WeightsError, read, unet
+from ..weights import WeightsError, compact, read
 from ..model import LEAK
 from . import blur, export, samples, train
 
@@ -25,20 +25,19 @@ MOMENTS = "1,2,4,8,pan,20"
 CHOOSING, HELD_OUT = 1 / 6, 1 / 4
 
 
-def shape_of(path):
-    """(widths, pointwise) of a weights file's network, which must be a U-Net of this package."""
+def widths_of(path):
+    """Channels of the levels of a weights file's network, which must be one of this package."""
     try:
         _, doc = read(path)
     except (OSError, WeightsError) as error:
         raise TrainingError(f"{path}: cannot begin with it: {error}") from error
     convolutions = {op["name"]: op for op in doc["graph"] if op["op"] == "conv2d"}
     widths = []
-    while (first := f"{f'down{len(widths)}' if widths else 'enc0'}.a") in convolutions:
+    while (first := f"down{len(widths)}.a") in convolutions:
         widths.append(convolutions[first]["out_channels"])
-    pointwise = sum(convolutions.get(f"up{i}.conv", {}).get("kernel") == [1, 1] for i in range(len(widths)))
-    if not widths or unet(samples.CHANNELS, tuple(widths), blur.GUIDANCE, pointwise, {"leaky_relu": LEAK})[0] != doc["graph"]:
+    if not widths or compact(samples.CHANNELS, tuple(widths), blur.GUIDANCE, {"leaky_relu": LEAK})[0] != doc["graph"]:
         raise TrainingError(f"{path}: cannot begin with it: its network is not one that filters; name another --begin")
-    return tuple(widths), pointwise
+    return tuple(widths)
 
 
 def draw(program, scene, folder, views, spp, seed, size, lit):
@@ -56,12 +55,12 @@ def draw(program, scene, folder, views, spp, seed, size, lit):
 
 def fit(program, scene, out, work, begin=SHIPPED, views=24, spp=64, minutes=2.0, size="512x256", seed=1, lit=(), **settings):
     """Does it all; returns what is printed."""
-    widths, pointwise = shape_of(begin)
+    widths = widths_of(begin)
     folders = {}
     for i, (name, count) in enumerate((("train", views), ("choosing", max(round(CHOOSING * views), 2)), ("held-out", max(round(HELD_OUT * views), 2)))):
         folders[name] = os.path.join(work, f"{name}-{count}-{spp}-{seed + i}-{size}")
         draw(program, scene, folders[name], count, spp, seed + i, size, lit)
-    config = train.Config(train=folders["train"], validation=folders["choosing"], begin=begin, widths=widths, pointwise=pointwise, minutes=minutes, seed=seed,
+    config = train.Config(train=folders["train"], validation=folders["choosing"], begin=begin, widths=widths, minutes=minutes, seed=seed,
                           **{"batch": 8, "learning_rate": 3e-4, "ema": 0.99} | settings)
     # Views of one scene are told apart by their seeds.
     run = train.train(config, os.path.join(work, "run"), same_names=True)

@@ -23,7 +23,7 @@ from ..errors import TrainingError, reported
 from ..losses import pooled_error
 from ..model import LEAK, flops, parameter_count
 from ..provenance import commit, machine_of
-from ..weights import GraphNet, WeightsError, read, unet
+from ..weights import GraphNet, WeightsError, compact, read
 from . import blur, samples
 
 # What the answer of such a network means, in weights files.
@@ -48,8 +48,8 @@ class Config:
     train: str = ""
     validation: str = ""
     begin: str = ""  # weights file whose numbers training begins with; else the untrained network
-    widths: tuple = (12, 16, 24, 32)
-    pointwise: int = 1  # levels with 1x1 kernels
+    teacher: str = ""  # weights file of a network of any shape whose filtered light is half of what is learnt
+    widths: tuple = (12, 24, 32, 48)
     without: tuple = ()  # features of the table that are zeroed, for ablations
     mute: tuple = ()  # parts of the answer that are zeroed, for ablations: near, far, trust, tolerance
     pools: tuple = POOLS  # sides of the squares of cells that the loss compares
@@ -71,7 +71,7 @@ class Config:
 def network(config):
     """The untrained network, whose answer is zeros."""
     torch.manual_seed(config.seed)
-    model = GraphNet(*unet(samples.CHANNELS, tuple(config.widths), blur.GUIDANCE, config.pointwise, {"leaky_relu": LEAK}))
+    model = GraphNet(*compact(samples.CHANNELS, tuple(config.widths), blur.GUIDANCE, {"leaky_relu": LEAK}))
     for op in model.graph:
         if op["op"] == "conv2d":
             layer = model.get_submodule(op["name"])
@@ -92,6 +92,19 @@ def begin_with(model, path):
         model.load_state_dict({name: torch.from_numpy(np.asarray(values, np.float32)) for name, values in tensors.items()})
     except (OSError, WeightsError, RuntimeError) as error:
         raise TrainingError(f"{path}: cannot begin with it: {error}") from error
+
+
+def taught_by(path):
+    """The network of a weights file of any shape, to learn from."""
+    try:
+        tensors, doc = read(path)
+        if doc["output"]["meaning"] != MEANING:
+            raise TrainingError(f"{path}: a network of meaning {doc['output']['meaning']} does not filter")
+        model = GraphNet(doc["graph"], doc["output"]["tensor"])
+        model.load_state_dict({name: torch.from_numpy(np.asarray(values, np.float32)) for name, values in tensors.items()})
+    except (OSError, WeightsError, RuntimeError) as error:
+        raise TrainingError(f"{path}: cannot learn from it: {error}") from error
+    return model.eval()
 
 
 def kept_channels(config):
@@ -151,7 +164,7 @@ def augmented(batch, rng):
     if rng.random() < 0.5:
         batch = {k: v.flip(-1) if torch.is_tensor(v) and v.dim() > 1 else v for k, v in batch.items()}
         features = batch["features"].clone()
-        for name in ("normal", "towards"):
+        for name in ("normal", "dominant_direction"):
             features[:, names.index(name)] *= -1
         batch["features"] = features
     features, first = batch["features"].clone(), names.index("chroma")
@@ -215,6 +228,7 @@ class Run:
         self.model, self.channels, self.parts = network(config).to(config.device), kept_channels(config), kept_parts(config)
         if config.begin:
             begin_with(self.model, config.begin)
+        self.teacher = taught_by(config.teacher).to(config.device) if config.teacher else None
         self.average = {k: v.detach().clone() for k, v in self.model.state_dict().items()}
         self.optimiser = torch.optim.AdamW(self.model.parameters(), lr=config.learning_rate, weight_decay=config.weight_decay)
         self.step, self.seconds, self.rows, self.best = 0, 0.0, [], (float("inf"), None)
@@ -268,6 +282,10 @@ class Run:
         # Beside each its next frame, if there is one.
         followed = np.flatnonzero(pile.later[chosen] >= 0) if c.flicker else []
         batch = augmented(pile.taken(np.concatenate([chosen, pile.later[chosen[followed]]]), window(pile, c.crop, rng)), rng)
+        if self.teacher:
+            # Less noisy than the target, and of all views that it has seen.
+            with torch.no_grad():
+                batch["target"] = 0.5 * (batch["target"] + blur.filtered(batch, self.teacher(batch["features"]))[0].clamp(min=0))
         answer = self.model(batch["features"] * self.channels) * self.parts
         shown, first = blur.filtered(batch, answer)
         learnt = [batch[k] for k in ("target", "mask", "mean", "noise")]

@@ -21,7 +21,7 @@ from .graph import complete
 from .operators import OPERATORS, scaled_axis, tensors
 from .problems import NotReadable, Problem, WeightsError
 
-__all__ = ["CELLS_V1", "CELLS_V2", "IMAGES_V1", "KEY", "OPERATORS", "VERSION", "Problem", "WeightsError", "check", "conv2d", "document",
+__all__ = ["CELLS_V1", "CELLS_V2", "IMAGES_V1", "KEY", "OPERATORS", "VERSION", "Problem", "WeightsError", "check", "compact", "conv2d", "document",
            "quantised", "read", "schema", "unet", "verify", "write"]
 
 
@@ -61,6 +61,27 @@ def unet(in_channels=15, widths=(16, 24, 32, 48), out_channels=12, pointwise=0, 
         ]
         level, channels = f"d{i}", width
     graph.append(conv2d("head", level, "y", channels, out_channels, 1 if pointwise else 3))
+    return graph, "y"
+
+
+def compact(in_channels=15, widths=(12, 24, 32, 48), out_channels=12, activation="relu"):
+    """A U-Net for GPUs, of few dispatches: (graph, output tensor's name). A level below is enlarged by the convolution that reads it,
+    and its skip is added there; two convolutions a level from the third on, and one at the borders."""
+    graph, level, channels = [], "input", in_channels
+    last = len(widths) - 1
+    for i, width in enumerate(widths):
+        kinds = [("a", 1 if i == 0 else 3, 1 if i == 0 else 2)] + [("b", 3, 1)] * (i > 1)
+        for letter, kernel, stride in kinds:
+            output = f"e{i}" if letter == kinds[-1][0] else f"down{i}.{letter}"
+            graph.append(conv2d(f"down{i}.{letter}", level, output, channels, width, kernel, stride, activation=activation))
+            level, channels = output, width
+    for i in range(last - 1, -1, -1):
+        graph += [
+            {"op": "upsample_nearest", "name": f"up{i}.larger", "input": level, "size_as": f"e{i}", "output": f"up{i}.larger"},
+            conv2d(f"up{i}.conv", f"up{i}.larger", f"d{i}", channels, widths[i], activation=activation, add=f"e{i}"),
+        ]
+        level, channels = f"d{i}", widths[i]
+    graph.append(conv2d("head", level, "y", channels, out_channels, 1))
     return graph, "y"
 
 

@@ -1,7 +1,7 @@
 //! How many reads of memory in a straight piece of code wait for one another: those that need no
 //! other's result are under way together.
 
-use super::instrument::Reader;
+use super::reader::Reader;
 use naga::{Expression, Function, Handle, Range, Statement};
 use std::collections::{HashMap, HashSet};
 

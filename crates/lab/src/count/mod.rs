@@ -4,11 +4,13 @@
 
 mod chain;
 mod instrument;
+mod reader;
 
 use bouncelight::gpu::bound::Bound;
 use bouncelight::gpu::tape::{self, Made};
 use bouncelight::gpu::{Gpu, readback};
-use instrument::{GROUP, NUMBERS};
+use instrument::GROUP;
+use reader::{FIRST, NUMBERS};
 use std::borrow::Cow;
 use std::cell::RefCell;
 use std::rc::Rc;
@@ -91,7 +93,7 @@ impl Count {
                 let (_, bound, _) = dispatch.groups.iter().find(|g| g.0 == *group)?;
                 let (_, bound) = bound.iter().find(|b| b.0 == *binding)?;
                 let (unit, all) = size(bound);
-                Some((unit * number(instrument::FIRST + i)).min(all))
+                Some((unit * number(FIRST + i)).min(all))
             };
             let bytes = bindings.as_ref()?.iter().enumerate().filter_map(asked).sum();
             let operations = [number(0), number(NUMBERS)];
