@@ -25,7 +25,7 @@ const UPDATES_ON_CHANGE: u32 = 8;
 const WIDE_BLUR_FRAMES: u32 = 5;
 
 /// Frames of an unchanged scene seen by a still camera after which a picture rests.
-const FRAMES_TO_REST: u32 = 64;
+pub const FRAMES_TO_REST: u32 = 64;
 
 /// What a frame is drawn of.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

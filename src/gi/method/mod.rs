@@ -108,8 +108,13 @@ impl Method {
 
     /// Frames of a still camera after which a frame does no more than later ones, until it rests: what it costs
     /// is counted then. (Cells with a short history send more rays.)
-    pub fn frames_to_rest(&self) -> u32 {
+    pub fn frames_to_steady(&self) -> u32 {
         if self.has_history() { Self::SETTLED + 16 } else { 1 }
+    }
+
+    /// Frames of a still camera after which a picture rests, and sends a fourth of its rays.
+    pub fn frames_to_rest(&self) -> u32 {
+        if self.has_history() { super::gather::FRAMES_TO_REST + 8 } else { 1 }
     }
 
     /// The method's name on the command line.

@@ -164,8 +164,12 @@ pub fn run(global: &Global, args: Args) -> Result<()> {
     if args.count {
         for (method, measured) in methods.iter().zip(&mut measured) {
             let still = count::Still { scene: &scene, camera: &camera, size: args.scene.size };
-            let costs = count::frame(&gpu, still, with(method), method.frames_to_rest())?;
-            *measured = measured.clone().with_costs(costs);
+            let at = [method.frames_to_steady(), method.frames_to_rest()];
+            let mut counted = count::frames(&gpu, still, with(method), &at)?.into_iter();
+            let steady = counted.next().unwrap_or_default();
+            // A method without history has one kind of frame.
+            let rest = counted.next().unwrap_or_else(|| steady.clone());
+            *measured = measured.clone().with_costs(steady, &rest);
         }
     }
     let network = if args.layers && names.contains(&MethodName::Neural) {
@@ -226,17 +230,18 @@ fn print(record: &Record, gpu: &Gpu, layers: bool) {
         let parts = m.bytes.iter().filter(|(_, b)| *b > 0).map(|(n, b)| format!("{n} {:.1}", mib(*b)));
         say!("  {:.1} MiB of GPU memory: {}", mib(m.total_bytes()), parts.collect::<Vec<_>>().join(", "));
         if !m.costs.is_empty() {
-            print_costs(&m.costs, layers);
+            print_costs(m, layers);
         }
     }
 }
 
-/// What shaders counted of a frame at rest; without `layers` the network's layers are one row.
-fn print_costs(costs: &[Cost], layers: bool) {
+/// What shaders counted of a frame of a still camera; without `layers` the network's layers are one row.
+fn print_costs(m: &Measurement, layers: bool) {
+    let costs = &m.costs;
     let ms = format!("{} ms", GTX_1050.name);
     say!(
         "  {:<26}{:>10}{:>10}{:>10}{:>10}{:>11}{ms:>13}",
-        "counted, at rest",
+        "counted, steady",
         "MFLOP",
         "waiting",
         "MB",
@@ -258,9 +263,9 @@ fn print_costs(costs: &[Cost], layers: bool) {
         row("net (all layers)", &network);
     }
     row("indirect light in all", &costs.iter().filter(|c| projection::is_indirect(&c.pass)).collect::<Vec<_>>());
-    let own = || costs.iter().filter(|c| projection::is_indirect(&c.pass));
     for card in [GTX_1050, GTX_1650] {
-        say!("  modelled for a {}, not measured: {:.1} ms", card.name, modelled(own(), &card));
+        let [steady, rest] = [&m.modelled, &m.modelled_at_rest].map(|of| of.get(card.key).copied().unwrap_or_default());
+        say!("  modelled for a {}, not measured: {steady:.1} ms, at rest {rest:.1}", card.name);
     }
 }
 

@@ -26,6 +26,8 @@ fn a_counted_frame_has_modelled_times_with_their_range() {
     for card in ["gtx_1050", "gtx_1650"] {
         let [least, ms, most] = ["least", "ms", "most"].map(|key| method["modelled"][card][key].as_f64().expect(key));
         assert!(0.0 < least && least < ms && ms < most, "{card}: {least} {ms} {most}");
+        // A method without history never rests.
+        assert_eq!(method["modelled_at_rest"][card], method["modelled"][card]);
     }
     for cost in method["costs"].as_array().expect("counted") {
         for key in ["dispatches", "threads", "links", "longest", "steps", "barriers"] {
@@ -37,6 +39,7 @@ fn a_counted_frame_has_modelled_times_with_their_range() {
     let mut earlier = record.clone();
     let old = earlier["methods"][0].as_object_mut().expect("a method");
     old.remove("modelled");
+    old.remove("modelled_at_rest");
     for cost in old["costs"].as_array_mut().expect("costs") {
         let cost = cost.as_object_mut().expect("a cost");
         cost.retain(|key, _| ["pass", "flops", "bytes"].contains(&key.as_str()));

@@ -64,20 +64,27 @@ pub struct Measurement {
     /// nobody has measured, by [`Card::key`].
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub modelled: BTreeMap<String, Modelled>,
+    /// The same once the picture rests ([`Method::frames_to_rest`]).
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub modelled_at_rest: BTreeMap<String, Modelled>,
     /// Draw calls, triangles and shadow maps of the last frame.
     #[serde(default)]
     pub drawn: DrawnCount,
 }
 
+/// What the passes that find and add indirect light are modelled to take on cards that nobody has
+/// measured.
+fn on_cards(costs: &[Cost]) -> BTreeMap<String, Modelled> {
+    let own = || costs.iter().filter(|c| is_indirect(&c.pass));
+    [GTX_1050, GTX_1650].map(|card: Card| (card.key.to_owned(), modelled(own(), &card))).into()
+}
+
 impl Measurement {
-    /// The same with what was counted of it.
+    /// The same with what was counted of it, and of a frame of a picture that rests.
     #[must_use]
-    pub fn with_costs(mut self, costs: Vec<Cost>) -> Self {
-        let of = |card: Card| {
-            let own = costs.iter().filter(|c| is_indirect(&c.pass));
-            (card.key.to_owned(), modelled(own, &card))
-        };
-        self.modelled = [GTX_1050, GTX_1650].map(of).into();
+    pub fn with_costs(mut self, costs: Vec<Cost>, at_rest: &[Cost]) -> Self {
+        self.modelled = on_cards(&costs);
+        self.modelled_at_rest = on_cards(at_rest);
         self.costs = costs;
         self
     }
@@ -207,6 +214,7 @@ fn measure_frames(
         wall_ms: spread(wall),
         costs: Vec::new(),
         modelled: BTreeMap::new(),
+        modelled_at_rest: BTreeMap::new(),
         drawn: renderer.drawn(),
         bytes: renderer
             .bytes()

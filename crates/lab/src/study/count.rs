@@ -1,7 +1,7 @@
 //! What the passes of a frame do, counted by the shaders themselves while they draw it.
 
 use super::projection::Cost;
-use crate::count::Count;
+use crate::count::{Count, Counted};
 use bouncelight::gpu::{Gpu, GpuError, readback::ReadbackError, timing::Recorder};
 use bouncelight::gpu_scene::{SceneGpu, UploadError};
 use bouncelight::render::{RenderError, Renderer, RendererOptions, View};
@@ -39,13 +39,22 @@ pub struct Still<'a> {
     pub size: [u32; 2],
 }
 
-/// Draws `frames` frames of a still camera, and says what the compute passes of the last did, in
-/// its order; on a device of its own, which has room for the sums. Passes that draw triangles are
-/// left out, and the layers of a network are those of its plan ([`Plan`](bouncelight::net::plan::Plan)).
+/// What the compute passes of a frame do, the last of `frames` of a still camera: see [`frames`].
 ///
 /// # Errors
 /// [`CountError`].
 pub fn frame(gpu: &Gpu, still: Still<'_>, options: RendererOptions, frames: u32) -> Result<Vec<Cost>, CountError> {
+    Ok(self::frames(gpu, still, options, &[frames])?.pop().unwrap_or_default())
+}
+
+/// Draws frames of a still camera, and says what the compute passes of those numbered `at`, from 1
+/// on in rising order, do, in their order; on a device of its own, which has room for the sums.
+/// Passes that draw triangles are left out, and the layers of a network are those of its plan
+/// ([`Plan`](bouncelight::net::plan::Plan)).
+///
+/// # Errors
+/// [`CountError`].
+pub fn frames(gpu: &Gpu, still: Still<'_>, options: RendererOptions, at: &[u32]) -> Result<Vec<Vec<Cost>>, CountError> {
     let gpu = gpu.for_counting()?;
     let Still { scene, camera, size } = still;
     let rays = options.method.needs_rays();
@@ -56,8 +65,10 @@ pub fn frame(gpu: &Gpu, still: Still<'_>, options: RendererOptions, frames: u32)
     }
     let mut renderer = Renderer::new(&gpu.device, &gpu.queue, size, options)?;
     let view = View::new(camera, size, [0.0; 2]);
-    for left in (0..frames.max(1)).rev() {
-        if left == 0 {
+    let mut found = Vec::new();
+    for number in 1..=at.last().copied().unwrap_or(1).max(1) {
+        let counts = at.contains(&number);
+        if counts {
             count.begin(&gpu.device);
         }
         let mut encoder = gpu.device.create_command_encoder(&Default::default());
@@ -65,12 +76,24 @@ pub fn frame(gpu: &Gpu, still: Still<'_>, options: RendererOptions, frames: u32)
         gpu.queue.submit([encoder.finish()]);
         // Drivers let frames pile up otherwise.
         let _ = gpu.device.poll(wgpu::PollType::wait_indefinitely());
+        if let Some(fallback) = renderer.fallback() {
+            return Err(CountError::Fallback(fallback.why.to_owned()));
+        }
+        if counts {
+            let mut costs = added_up(count.take(&gpu)?);
+            if let Some(plan) = renderer.plan() {
+                costs.extend(plan.steps.iter().map(|s| Cost::of_step(plan, s, &s.name)));
+            }
+            found.push(costs);
+        }
     }
-    if let Some(fallback) = renderer.fallback() {
-        return Err(CountError::Fallback(fallback.why.to_owned()));
-    }
+    Ok(found)
+}
+
+/// Costs of passes, of what their dispatches did.
+fn added_up(dispatches: Vec<Counted>) -> Vec<Cost> {
     let mut costs: Vec<Cost> = Vec::new();
-    for dispatch in count.take(&gpu)? {
+    for dispatch in dispatches {
         let at = costs.iter().position(|c| c.pass == dispatch.label).unwrap_or_else(|| {
             costs.push(Cost::new(&dispatch.label, 0.0, 0.0));
             costs.len() - 1
@@ -87,8 +110,5 @@ pub fn frame(gpu: &Gpu, still: Still<'_>, options: RendererOptions, frames: u32)
         costs[at].steps += dispatch.longest[1];
         costs[at].barriers += dispatch.barriers;
     }
-    if let Some(plan) = renderer.plan() {
-        costs.extend(plan.steps.iter().map(|s| Cost::of_step(plan, s, &s.name)));
-    }
-    Ok(costs)
+    costs
 }

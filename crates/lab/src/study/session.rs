@@ -293,13 +293,13 @@ impl<'a> Session<'a> {
     }
 
     /// What the passes that find and add indirect light do in a frame of a still camera, settled
-    /// over [`Method::frames_to_rest`].
+    /// over [`Method::frames_to_steady`].
     ///
     /// # Errors
     /// [`SessionError::Count`].
     pub fn count(&self, method: &Method, camera: &Camera) -> Result<Vec<Cost>, SessionError> {
         let still = count::Still { scene: &self.scene, camera, size: self.size };
-        let mut costs = count::frame(self.gpu, still, self.renderer_options(method), method.frames_to_rest())?;
+        let mut costs = count::frame(self.gpu, still, self.renderer_options(method), method.frames_to_steady())?;
         costs.retain(|c| projection::is_indirect(&c.pass));
         Ok(costs)
     }

@@ -97,9 +97,9 @@ fn rows(
         let seconds = SHARE * run.left();
         let measured = one(gpu, with.clone(), &uploaded, camera, size, seconds);
         let Some((mut measured, frames)) = run.kept(&what, measured) else { continue };
-        let frames_to_rest = with.frames_to_rest();
+        let steady = with.frames_to_steady();
         let options = RendererOptions { method: with, ..Default::default() };
-        let counted = count::frame(gpu, count::Still { scene, camera, size }, options, frames_to_rest);
+        let counted = count::frame(gpu, count::Still { scene, camera, size }, options, steady);
         measured.costs = run.kept(&format!("{what}, counts"), counted).unwrap_or_default();
         measured.costs.retain(|c| is_indirect(&c.pass));
         let direct = rows.first().map_or(measured.wall_ms.median, |r| r.measured.wall_ms.median);
@@ -176,6 +176,7 @@ mod tests {
             bytes: Vec::new(),
             costs: Vec::new(),
             modelled: Default::default(),
+            modelled_at_rest: Default::default(),
             drawn: Default::default(),
         };
         assert_eq!(own(&m, 3.0), (1.5, Timing::Timestamps));
