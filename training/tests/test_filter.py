@@ -97,8 +97,7 @@ class WithTheProgram(unittest.TestCase):
             state = train.read_checkpoint(os.path.join(folder, "run", "checkpoint.pt"))
             errors = [row["validation_error"] for row in state["rows"]]
             self.assertEqual(state["best"][0], min(errors))
-            start = train.network(train.Config(widths=(16, 24, 32, 48, 64)))
-            train.begin_with(start, scene.SHIPPED)
+            start = train.network_of(scene.SHIPPED)
             learnt = lambda weights: any(not torch.equal(weights[k], v) for k, v in start.state_dict().items())
             self.assertTrue(learnt(state["average"]))
             self.assertEqual(learnt(state["best"][1]), errors.index(min(errors)) > 0)
@@ -109,16 +108,41 @@ class WithTheProgram(unittest.TestCase):
 class Alone(unittest.TestCase):
     def test_what_cannot_be_begun_with_is_named(self):
         other = os.path.join(os.path.dirname(scene.SHIPPED), "..", "..", "weights-format", "fixtures", "add.safetensors")
-        self.assertEqual(scene.shape_of(scene.SHIPPED), ((16, 24, 32, 48, 64), 1))
-        model = train.network(train.Config(widths=(4, 8)))
-        with self.assertRaisesRegex(TrainingError, "not one that filters"):
-            scene.shape_of(other)
         with self.assertRaisesRegex(TrainingError, "cannot begin with it"):
-            scene.shape_of("none.safetensors")
+            train.network_of("none.safetensors")
         with self.assertRaisesRegex(TrainingError, "does not filter"):
-            train.begin_with(model, other)
-        with self.assertRaisesRegex(TrainingError, "cannot begin with it"):
-            train.begin_with(model, scene.SHIPPED)
+            train.network(train.Config(begin=other))
+
+    def test_a_mirror_image_turns_what_points_sideways(self):
+        flat = np.ones((3, 24, 24), np.float32)
+        pile, = self.made_up([("a", "4", 4, flat, flat)])
+        names = [name for name, n in samples.TABLE for _ in range(n)]
+        seen = set()
+        for seed in range(8):
+            batch = pile.taken([0])
+            turned = train.augmented(batch, np.random.default_rng(seed))
+            for name in ("normal", "dominant_direction"):
+                x = names.index(name)
+                mirrored = torch.equal(turned["features"][:, x], -batch["features"][:, x].flip(-1))
+                self.assertTrue(mirrored or torch.equal(turned["features"][:, x], batch["features"][:, x]))
+                self.assertEqual(torch.equal(turned["features"][:, x + 1], batch["features"][:, x + 1].flip(-1)), mirrored)
+                seen.add(mirrored)
+        self.assertEqual(seen, {True, False})
+
+    def test_another_network_teaches(self):
+        noisy = np.random.default_rng(1).gamma(2, 0.5, (3, 24, 24)).astype(np.float32)
+        piles = self.made_up([("a", "4", 4, noisy, np.ones_like(noisy))])
+        train.based(piles, train.POOLS)
+
+        def slope(**teacher):
+            run = train.Run(train.Config(widths=(4, 8), batch=2, learning_rate=0.0, **teacher), "")
+            run.train_step(piles, 0.0)
+            return torch.cat([p.grad.flatten() for p in run.model.parameters()])
+
+        alone, taught = slope(), slope(teacher=scene.SHIPPED, taught=1.0)
+        self.assertGreater((alone - taught).abs().max(), 1e-4)
+        # Negative control: one that counts for nothing.
+        self.assertTrue(torch.equal(slope(teacher=scene.SHIPPED, taught=0.0), alone))
 
     def test_each_part_is_left_out_once(self):
         base = train.Config(train="a", validation="b")

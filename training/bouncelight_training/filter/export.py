@@ -11,9 +11,9 @@ import torch
 
 from ..errors import TrainingError, reported
 from ..model import parameter_count
-from ..weights import WeightsError, document, verify, write
+from ..weights import GraphNet, WeightsError, document, verify, write
 from . import blur, samples
-from .train import MEANING, Config, kept_parts, network, read_checkpoint
+from .train import MEANING, Config, kept_parts, read_checkpoint
 
 
 def export(run, out, name=""):
@@ -21,7 +21,7 @@ def export(run, out, name=""):
     state = read_checkpoint(os.path.join(run, "checkpoint.pt"))
     config = Config(**{k: tuple(v) if isinstance(v, list) else v for k, v in state["config"].items()} | {"device": "cpu"})
     error, average = state["best"]
-    model = network(config)
+    model = GraphNet(state["graph"], state["output"])
     model.load_state_dict(average)
     # A feature that the run left out has no weight.
     first = model.get_submodule(model.graph[0]["name"])

@@ -9,35 +9,19 @@ began with included; yet others are held out, and their error before and after i
 scene is lit (`--environment`, `--light-radius`). Everything is kept in the work folder, and the same command goes on where it was stopped.
 """
 import argparse
+import copy
 import json
 import os
 import subprocess
 import sys
 
 from ..errors import TrainingError, reported
-from ..weights import WeightsError, compact, read
-from ..model import LEAK
-from . import blur, export, samples, train
+from . import export, samples, train
 
 SHIPPED = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "..", "..", "assets", "weights", "filter.safetensors")
 MOMENTS = "1,2,4,8,pan,20"
 # Views that choose and views that are held out, against those that are learnt.
 CHOOSING, HELD_OUT = 1 / 6, 1 / 4
-
-
-def widths_of(path):
-    """Channels of the levels of a weights file's network, which must be one of this package."""
-    try:
-        _, doc = read(path)
-    except (OSError, WeightsError) as error:
-        raise TrainingError(f"{path}: cannot begin with it: {error}") from error
-    convolutions = {op["name"]: op for op in doc["graph"] if op["op"] == "conv2d"}
-    widths = []
-    while (first := f"down{len(widths)}.a") in convolutions:
-        widths.append(convolutions[first]["out_channels"])
-    if not widths or compact(samples.CHANNELS, tuple(widths), blur.GUIDANCE, {"leaky_relu": LEAK})[0] != doc["graph"]:
-        raise TrainingError(f"{path}: cannot begin with it: its network is not one that filters; name another --begin")
-    return tuple(widths)
 
 
 def draw(program, scene, folder, views, spp, seed, size, lit):
@@ -55,19 +39,17 @@ def draw(program, scene, folder, views, spp, seed, size, lit):
 
 def fit(program, scene, out, work, begin=SHIPPED, views=24, spp=64, minutes=2.0, size="512x256", seed=1, lit=(), **settings):
     """Does it all; returns what is printed."""
-    widths = widths_of(begin)
+    before = train.network_of(begin)
     folders = {}
     for i, (name, count) in enumerate((("train", views), ("choosing", max(round(CHOOSING * views), 2)), ("held-out", max(round(HELD_OUT * views), 2)))):
         folders[name] = os.path.join(work, f"{name}-{count}-{spp}-{seed + i}-{size}")
         draw(program, scene, folders[name], count, spp, seed + i, size, lit)
-    config = train.Config(train=folders["train"], validation=folders["choosing"], begin=begin, widths=widths, minutes=minutes, seed=seed,
+    config = train.Config(train=folders["train"], validation=folders["choosing"], begin=begin, minutes=minutes, seed=seed,
                           **{"batch": 8, "learning_rate": 3e-4, "ema": 0.99} | settings)
     # Views of one scene are told apart by their seeds.
     run = train.train(config, os.path.join(work, "run"), same_names=True)
     held_out = samples.piles(samples.read(folders["held-out"]), config.device)
-    before = train.network(config)
-    train.begin_with(before, begin)
-    after = train.network(config)
+    after = copy.deepcopy(before)
     after.load_state_dict(run.best[1])
     errors = [train.validate(model.to(config.device).eval(), held_out, run.channels, run.parts) for model in (before, after)]
     told = export.export(os.path.join(work, "run"), out, f"fitted to {os.path.splitext(os.path.basename(scene))[0]}")

@@ -6,6 +6,7 @@ The same command goes on where a killed run stopped. The run's folder holds conf
 average of the weights over steps (EMA) that did best on the validation's views, what training begins with (untrained: `gather` itself) included.
 """
 import argparse
+import copy
 import csv
 import dataclasses
 import json
@@ -48,7 +49,8 @@ class Config:
     train: str = ""
     validation: str = ""
     begin: str = ""  # weights file whose numbers training begins with; else the untrained network
-    teacher: str = ""  # weights file of a network of any shape whose filtered light is half of what is learnt
+    teacher: str = ""  # weights file of a network of any shape whose filtered light is learnt, too
+    taught: float = 0.5  # what that light counts; the rest is the target
     widths: tuple = (12, 24, 32, 48)
     without: tuple = ()  # features of the table that are zeroed, for ablations
     mute: tuple = ()  # parts of the answer that are zeroed, for ablations: near, far, trust, tolerance
@@ -69,7 +71,9 @@ class Config:
 
 
 def network(config):
-    """The untrained network, whose answer is zeros."""
+    """The network that training begins with: that of a weights file, or an untrained one, whose answer is zeros."""
+    if config.begin:
+        return network_of(config.begin)
     torch.manual_seed(config.seed)
     model = GraphNet(*compact(samples.CHANNELS, tuple(config.widths), blur.GUIDANCE, {"leaky_relu": LEAK}))
     for op in model.graph:
@@ -83,19 +87,8 @@ def network(config):
     return model
 
 
-def begin_with(model, path):
-    """Gives the network the numbers of a weights file of the same shape."""
-    try:
-        tensors, doc = read(path)
-        if doc["output"]["meaning"] != MEANING:
-            raise TrainingError(f"{path}: a network of meaning {doc['output']['meaning']} does not filter")
-        model.load_state_dict({name: torch.from_numpy(np.asarray(values, np.float32)) for name, values in tensors.items()})
-    except (OSError, WeightsError, RuntimeError) as error:
-        raise TrainingError(f"{path}: cannot begin with it: {error}") from error
-
-
-def taught_by(path):
-    """The network of a weights file of any shape, to learn from."""
+def network_of(path):
+    """The network of a weights file, of whatever shape."""
     try:
         tensors, doc = read(path)
         if doc["output"]["meaning"] != MEANING:
@@ -103,8 +96,8 @@ def taught_by(path):
         model = GraphNet(doc["graph"], doc["output"]["tensor"])
         model.load_state_dict({name: torch.from_numpy(np.asarray(values, np.float32)) for name, values in tensors.items()})
     except (OSError, WeightsError, RuntimeError) as error:
-        raise TrainingError(f"{path}: cannot learn from it: {error}") from error
-    return model.eval()
+        raise TrainingError(f"{path}: cannot begin with it: {error}") from error
+    return model
 
 
 def kept_channels(config):
@@ -226,9 +219,7 @@ class Run:
     def __init__(self, config, folder):
         self.config, self.folder = config, folder
         self.model, self.channels, self.parts = network(config).to(config.device), kept_channels(config), kept_parts(config)
-        if config.begin:
-            begin_with(self.model, config.begin)
-        self.teacher = taught_by(config.teacher).to(config.device) if config.teacher else None
+        self.teacher = network_of(config.teacher).to(config.device).eval() if config.teacher else None
         self.average = {k: v.detach().clone() for k, v in self.model.state_dict().items()}
         self.optimiser = torch.optim.AdamW(self.model.parameters(), lr=config.learning_rate, weight_decay=config.weight_decay)
         self.step, self.seconds, self.rows, self.best = 0, 0.0, [], (float("inf"), None)
@@ -240,7 +231,7 @@ class Run:
 
     def save(self):
         state = {k: getattr(self, k) for k in ("average", "step", "seconds", "rows", "best")}
-        state |= {"config": dataclasses.asdict(self.config), "model": self.model.state_dict(), "optimiser": self.optimiser.state_dict(),
+        state |= {"config": dataclasses.asdict(self.config), "graph": self.model.graph, "output": self.model.output, "model": self.model.state_dict(), "optimiser": self.optimiser.state_dict(),
                   "commit": commit(), "machine": machine_of(torch.device(self.config.device))}
         torch.save(state, self.path + ".part")
         os.replace(self.path + ".part", self.path)
@@ -259,7 +250,7 @@ class Run:
         self.average = {k: v.to(self.config.device) for k, v in self.average.items()}
 
     def averaged(self):
-        model = network(self.config).to(self.config.device)
+        model = copy.deepcopy(self.model)
         model.load_state_dict(self.average)
         return model.eval()
 
@@ -285,7 +276,8 @@ class Run:
         if self.teacher:
             # Less noisy than the target, and of all views that it has seen.
             with torch.no_grad():
-                batch["target"] = 0.5 * (batch["target"] + blur.filtered(batch, self.teacher(batch["features"]))[0].clamp(min=0))
+                light = blur.filtered(batch, self.teacher(batch["features"]))[0].clamp(min=0)
+            batch["target"] = torch.lerp(batch["target"], light, c.taught)
         answer = self.model(batch["features"] * self.channels) * self.parts
         shown, first = blur.filtered(batch, answer)
         learnt = [batch[k] for k in ("target", "mask", "mean", "noise")]
