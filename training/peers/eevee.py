@@ -129,8 +129,7 @@ def main():
     record |= draw(scene, a.out, a.samples)
     settled = scene.camera.matrix_world.copy()
     for degrees in a.turns:
-        # Blender's Z is the vertical; judge.py turns the other way about glTF's Y.
-        scene.camera.matrix_world = Matrix.Translation(settled.translation) @ Matrix.Rotation(-math.radians(degrees), 4, "Z") @ Matrix.Translation(-settled.translation) @ settled
+        scene.camera.matrix_world = Matrix.Translation(settled.translation) @ Matrix.Rotation(math.radians(degrees), 4, "Z") @ Matrix.Translation(-settled.translation) @ settled
         draw(scene, f"{a.out.removesuffix('.exr')}_{degrees:g}.exr", a.samples)
     with open(a.out + ".times", "w") as file:
         json.dump(record, file)

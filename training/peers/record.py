@@ -13,6 +13,24 @@ SETTINGS = {
 }
 
 
+def seconds(row, times, cores=2):
+    """What a peer's picture takes on all cores: its processor time over their number, which other work on the machine does not lengthen; else what the clock said."""
+    if "paths" in row:
+        return (row["paths"] * times["path_cpu_s"] + row["denoise_cpu_s"]) / cores
+    return row["cpu_s"] / cores if "cpu_s" in row else row["wall_s"]
+
+
+def marks(record, metric):
+    """For the chart: (peers, curve of paths + OIDN), each a list of (name, mean seconds, mean error), of rows that were judged in every timed scene."""
+    kinds = {True: [], False: []}
+    for name in dict.fromkeys(r["row"] for r in record["rows"]):
+        rows = [r for r in record["rows"] if r["row"] == name and r["scene"] in record["times"] and r.get(metric) is not None and ("paths" in r or "wall_s" in r)]
+        if rows and len(rows) == len(record["times"]):
+            time = sum(seconds(r, record["times"][r["scene"]]) for r in rows) / len(rows)
+            kinds["paths" in rows[0]].append((name, time, sum(r[metric] for r in rows) / len(rows)))
+    return kinds[False], sorted(kinds[True], key=lambda mark: mark[1])
+
+
 def geometric(low, high, t):
     """Between two numbers, even in their logarithm."""
     return low ** (1 - t) * high**t
@@ -28,8 +46,9 @@ class Record:
                 self.all |= {key: value for key, value in json.load(file).items() if key in ("rows", "times", "stability")}
 
     def put(self, row):
-        same = lambda r: (r["scene"], r["row"]) == (row["scene"], row["row"])
-        self.all["rows"] = [r for r in self.all["rows"] if not same(r)] + [row]
+        rows, name = self.all["rows"], lambda r: (r["scene"], r["row"])
+        at = next((i for i, r in enumerate(rows) if name(r) == name(row)), len(rows))
+        rows[at:at + 1] = [row]
 
     def put_times(self, scene, times):
         self.all["times"][scene] = times
