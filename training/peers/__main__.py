@@ -23,6 +23,8 @@ import os
 import subprocess
 import sys
 
+import numpy as np
+
 sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), ".."))
 import judge  # noqa: E402
 from peers import paths, record, scenes, stability, times  # noqa: E402
@@ -57,13 +59,25 @@ class Run:
     def path(self, scene, name):
         return os.path.join(self.a.out, f"{scene.name}_{name}".replace(" ", "_").replace(",", "") + ".exr")
 
+    def without_black(self, picture, found, truth):
+        """The picture, or a copy with the reference's pixels where that shows coincident faces black (as light_error leaves them out)."""
+        surface, light = self.direct["Depth.Z"] < 1e9, sum(truth[f"{n}.{c}"] for n in ("DiffInd", "DiffDir") for c in "RGB")
+        black = surface & (judge.rgb(self.direct, "DiffCol").min(-1) > 0.01) & (light < 0.02 * np.median(light[surface]))
+        if not black.any():
+            return picture
+        whole = scenes.layers_of(truth)
+        copy = picture.removesuffix(".exr") + ".judged.exr"
+        if not os.path.exists(copy) or os.path.getmtime(copy) < os.path.getmtime(picture):
+            judge.write(copy, np.where(black[..., None], judge.rgb(whole, ""), judge.rgb(found, "")))
+        return copy
+
     def judged(self, scene, row, picture, said, with_direct=False):
         """A row of the record. with_direct: the picture has its own direct light, or all light in DiffDir."""
-        r, found = judge.compared(self.a.bouncelight, picture, scene.reference), judge.layers(picture)
-        light = None
+        found, truth = scenes.layers(picture), judge.layers(scene.reference)
+        r, light = judge.compared(self.a.bouncelight, self.without_black(picture, found, truth), scene.reference), None
         if "DiffInd.R" in found or "DiffDir.R" in found:
             nothing = {f"DiffInd.{c}": 0 * self.direct["DiffDir.R"] for c in "RGB"}
-            light = judge.light_error(nothing | found, self.direct, judge.layers(scene.reference), with_direct)
+            light = judge.light_error(nothing | found, self.direct, truth, with_direct)
         return {"scene": scene.name, "row": row, "light": light, "psnr": r["display"]["psnr"], "ssim": r["display"]["ssim"], "flip": r["flip"], **said}
 
     def ours(self, scene):

@@ -14,7 +14,7 @@ from peers import scenes
 
 FRAMES = 16
 #: SSGINode's giIntensity; its default, 10, is no physical light. Chosen among 1, 3 and 10 with the hotel in view.
-INTENSITY = 3
+INTENSITY = 1
 STAMP = f"three 0.187 {FRAMES} {INTENSITY}"
 HERE = os.path.join(os.path.dirname(os.path.abspath(__file__)), "browser")
 

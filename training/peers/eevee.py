@@ -86,14 +86,21 @@ def bake(scene, probes, samples):
     data.resolution_x, data.resolution_y, data.resolution_z = grid
     # The outermost cell of a volume fades into the sky, so it lies outside of the walls.
     volume.location, volume.scale = (low + high) / 2, Vector(v / 2 * (1 + 2 / n) for v, n in zip(span, grid))
-    # Surfels a metre: about 400,000 over walls of this size, at most Blender's own 20.
-    data.surfel_density = max(1, min(20, int(math.sqrt(4e5 / (2 * (span.x * span.y + span.y * span.z + span.z * span.x))))))
-    data.bake_samples, data.clamp_indirect = samples, 0
+    # Surfels a metre: about 60,000 over walls of this size, at most 20. Blender counts them in units of the volume, which is 2 wide.
+    surfels = min(20, math.sqrt(6e4 / (2 * (span.x * span.y + span.y * span.z + span.z * span.x))))
+    data.surfel_density = max(1, round(surfels * max(volume.scale)))
+    data.bake_samples, data.clamp_indirect, data.capture_world, data.capture_distance = samples, 0, True, span.length
     bpy.context.view_layer.objects.active = volume
     volume.select_set(True)
     start, work = time.time(), time.process_time()
-    bpy.ops.object.lightprobe_cache_bake(subset="ALL")
-    return {"grid": grid, "surfels_a_metre": data.surfel_density, "bake_s": time.time() - start, "bake_cpu_s": time.process_time() - work}
+    for _ in range(8):
+        try:
+            bpy.ops.object.lightprobe_cache_bake(subset="ALL")
+            break
+        except RuntimeError:  # Too many for its memory.
+            surfels *= 0.7
+            data.surfel_density = max(1, round(surfels * max(volume.scale)))
+    return {"grid": grid, "surfels_a_metre": surfels, "bake_s": time.time() - start, "bake_cpu_s": time.process_time() - work}
 
 
 def draw(scene, path, samples):

@@ -40,10 +40,13 @@ def all_scenes(folders, fine=None, interior=None):
             yield Scene("interior", ["interior"], path, interior, True)
 
 
-def layers(path):
+def layers_of(found):
     """Layers of our pictures, Cycles' or Eevee's, the finished picture always as R, G, B."""
-    found = judge.layers(path)
     return found | {c: found[f"Combined.{c}"] for c in "RGB" if f"Combined.{c}" in found}
+
+
+def layers(path):
+    return layers_of(judge.layers(path))
 
 
 #: Metres in a unit of files that have another.
