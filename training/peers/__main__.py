@@ -116,7 +116,7 @@ def main():
     words = lambda t: t.split(",")
     parser.add_argument("out", type=os.path.abspath)
     parser.add_argument("--references", nargs="+", required=True, type=os.path.abspath)
-    parser.add_argument("--fine", type=os.path.abspath, help="folder of references with less noise; scenes that it has are judged by them")
+    parser.add_argument("--fine", nargs="+", default=[], type=os.path.abspath, help="folders of references with less noise; scenes that they have are judged by them")
     parser.add_argument("--interior", type=os.path.abspath, help="folder with the bundled interior's scene.glb, for peers")
     parser.add_argument("--peers", type=words, default=GROUPS)
     parser.add_argument("--scenes", type=words)
@@ -143,7 +143,7 @@ def main():
             for group in a.peers:
                 try:
                     for row in run.rows(scene, group):
-                        known.put(row | {"reference": "fine" if a.fine and scene.reference.startswith(a.fine) else "coarse"})
+                        known.put(row | {"reference": "fine" if scene.reference.startswith(tuple(a.fine)) else "coarse"})
                 except (subprocess.SubprocessError, OSError) as error:
                     print(f"{scene.name}, {group}: {error}", file=sys.stderr, flush=True)
                 known.write()

@@ -25,15 +25,14 @@ class Scene:
         return "gather" if self.caustics else "gather+caustics=0"
 
 
-def all_scenes(folders, fine=None, interior=None):
+def all_scenes(folders, fine=(), interior=None):
     """Scenes of folders of references: a folder a scene, roomIIII_view0.exr, interior.exr (whose scene is the folder `interior`). Those of
     which `fine` has a reference are judged by it."""
     for folder in folders:
         for _, name, words, reference in judge.references(folder):
             room = re.fullmatch(r"room(\d+)_view0", name)
-            better = os.path.join(fine or "", name, "frame0000.exr")
-            if fine and not room and os.path.exists(better):
-                reference = better
+            better = [path for path in (os.path.join(f, name, "frame0000.exr") for f in fine) if os.path.exists(path)]
+            reference = better[0] if better else reference
             yield Scene(f"room {int(room[1])}" if room else name, words, reference, room[1] if room else os.path.join(folder, name), bool(room))
         path = os.path.join(folder, "interior.exr")
         if os.path.exists(path):
