@@ -48,6 +48,7 @@ def load(source):
 
 def in_metres(scene, scale):
     """Everything times `scale` about the origin, so that lengths are metres; lamps keep what they shine on surfaces."""
+    bpy.context.view_layer.update()
     for thing in [o for o in scene.objects if not o.parent]:
         thing.matrix_world = Matrix.Scale(scale, 4) @ thing.matrix_world
     for thing in scene.objects:
@@ -75,6 +76,8 @@ def configure(scene, size, samples):
 
 def bake(scene, probes, samples):
     """A volume of light probes over the scene; the grid, and the seconds of wall and processor."""
+    # Without it lamps stand where they were made, at the origin.
+    bpy.context.view_layer.update()
     corners = [o.matrix_world @ Vector(c) for o in scene.objects if o.type == "MESH" for c in o.bound_box]
     low, high = (Vector(f(c[i] for c in corners) for i in range(3)) for f in (min, max))
     data = bpy.data.lightprobes.new("volume", "VOLUME")

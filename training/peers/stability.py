@@ -23,7 +23,7 @@ def _ours(a, scene, folder):
     found = {}
     references = os.path.dirname(scene.source)
     share = ["--scenes", scene.name, "--size", scenes.SIZE, "--bouncelight", a.bouncelight]
-    for script, key, words in (("flicker.py", "flicker", ["--methods", "gather,gather+taa", "--samples", "4", "--spp", "16"]), ("turned.py", "turned", ["--methods", "gather"])):
+    for script, key, words in (("flicker.py", "flicker", ["--methods", "gather,gather+taa", "--samples", "4", "--spp", "8"]), ("turned.py", "turned", ["--methods", "gather"])):
         done = subprocess.run([sys.executable, os.path.join(HERE, "..", script), os.path.join(folder, key), references, *share, *words], check=True, capture_output=True, text=True)
         for row, value in re.findall(rf"^{scene.name} (.+?): ([\d.]+) %", done.stdout, re.MULTILINE):
             found.setdefault({"control": "gather, no history"}.get(row, row), {})[key] = float(value) / 100

@@ -23,11 +23,11 @@ def _bench(program, scene, warmup, frames, path):
 
 
 def of(program, scene, out):
-    """Seconds of wall and processor. Starting costs the same for few and many, so processor time is told by their difference. `rest`: the median of frames 33
-    to 40 of a still camera; `cut`: the mean of the frames from the third on."""
+    """Seconds of wall and processor. Starting costs the same for few and many, so processor time is told by their difference. `rest`: the median of frames 17
+    to 21 of a still camera; `cut`: the mean of the frames from the third on."""
     path, picture = os.path.join(out, "bench.json"), os.path.join(out, "timed.exr")
     _, few = _spent(lambda: _bench(program, scene, 1, 1, path))
-    wall, many = _spent(lambda: _bench(program, scene, 32, 8, path))
+    wall, many = _spent(lambda: _bench(program, scene, 16, 5, path))
     one, less = _spent(lambda: paths.traced(program, scene, 1, picture))
-    five, more = _spent(lambda: paths.traced(program, scene, 5, picture))
-    return {"frame_s": wall, "frame_cpu_s": (many - few) / 38, "path_s": (five - one) / 4, "path_cpu_s": (more - less) / 4}
+    four, more = _spent(lambda: paths.traced(program, scene, 4, picture))
+    return {"frame_s": wall, "frame_cpu_s": (many - few) / 19, "path_s": (four - one) / 3, "path_cpu_s": (more - less) / 3}
