@@ -23,7 +23,7 @@ def _ours(a, scene, folder):
     found = {}
     references = os.path.dirname(scene.source)
     share = ["--scenes", scene.name, "--size", scenes.SIZE, "--bouncelight", a.bouncelight]
-    for script, key, words in (("flicker.py", "flicker", ["--methods", "gather,gather+taa", "--samples", "4", "--spp", "8"]), ("turned.py", "turned", ["--methods", "gather"])):
+    for script, key, words in (("flicker.py", "flicker", ["--methods", "gather+taa", "--samples", "4", "--spp", "8"]), ("turned.py", "turned", ["--methods", "gather"])):
         done = subprocess.run([sys.executable, os.path.join(HERE, "..", script), os.path.join(folder, key), references, *share, *words], check=True, capture_output=True, text=True)
         for row, value in re.findall(rf"^{scene.name} (.+?): ([\d.]+) %", done.stdout, re.MULTILINE):
             found.setdefault({"control": "gather, no history"}.get(row, row), {})[key] = float(value) / 100
@@ -51,7 +51,8 @@ def _frames(a, scene, folder, row):
     return drawn
 
 
-def of(a, scene, peers=("4 paths + OIDN", "Eevee", "Eevee, probes")):
+def of(a, scene):
+    peers = [row for group, row in (("paths", "4 paths + OIDN"), ("eevee", "Eevee"), ("probes", "Eevee, probes")) if group in a.peers]
     folder = os.path.join(a.out, f"stability_{scene.name}")
     os.makedirs(folder, exist_ok=True)
     with open(os.path.join(scene.source, "meta.json")) as file:
