@@ -119,7 +119,7 @@ def main():
     here.plot([e["ms"] for e in paths], [mean(e["error"]) for e in paths], "k--o", markersize=3, linewidth=1)
     for e in paths:
         here.annotate(e["name"], (e["ms"], mean(e["error"])), (5, 3), textcoords="offset points", fontsize=8)
-    beside = f"; peers (stars, dotted) of {draw_peers(here, a.peers, a.metric)} scenes" if a.peers else ""
+    beside = f"\npeers (stars, dotted) of {draw_peers(here, a.peers, a.metric)} scenes" if a.peers else ""
     here.set_title(f"Measured: {device['adapter']}{' (a CPU driver, no GPU)' if device['software'] else ''}{beside}", loc="left")
     here.set(xlabel=f"time of a whole frame, ms ({'timestamps' if clock.startswith('gpu') else 'synchronised clock'})", ylabel=TITLES[a.metric])
     panel(there, found, "projected", "projected")
