@@ -76,7 +76,6 @@ def configure(scene, size, samples):
 
 def bake(scene, probes, samples):
     """A volume of light probes over the scene; the grid, and the seconds of wall and processor."""
-    # Without it lamps stand where they were made, at the origin.
     bpy.context.view_layer.update()
     corners = [o.matrix_world @ Vector(c) for o in scene.objects if o.type == "MESH" for c in o.bound_box]
     low, high = (Vector(f(c[i] for c in corners) for i in range(3)) for f in (min, max))
