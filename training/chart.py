@@ -1,15 +1,17 @@
 """Draws what `bouncelight chart` measured: error up, time across, once as measured and once as modelled for a GTX 1050.
 
-    python training/chart.py docs/results [--metric light|flip|l1]
+    python training/chart.py docs/results [--metric light|flip|l1] [--peers peers.json]
 
 FOLDER holds chart.json and chart.csv; chart.svg goes beside them. Full marks are settled pictures, hollow ones the first frame
 after a cut, bars the best and the worst scene; grey steps join what nothing beats in both, the dashed line is of paths. Marks differ
-in shape as well as in colour (Okabe and Ito's palette), and their names stand beside them. Needs matplotlib.
+in shape as well as in colour (Okabe and Ito's palette), and their names stand beside them. --peers adds what `python -m peers` measured, over its
+own scenes: stars, and the dotted curve of denoised paths that is to be beaten. Needs matplotlib.
 """
 import argparse
 import csv
 import json
 import os
+import sys
 
 import matplotlib
 
@@ -18,6 +20,9 @@ matplotlib.use("Agg")
 matplotlib.rcParams.update({"svg.fonttype": "none", "svg.hashsalt": "bouncelight", "font.size": 9})
 import matplotlib.pyplot as plt  # noqa: E402
 from matplotlib.ticker import LogLocator  # noqa: E402
+
+sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
+from peers.record import marks  # noqa: E402
 
 TITLES = {"light": "error of the light that is added, %", "flip": "FLIP", "l1": "the paper's L1 (sum, for 1024×512 pixels)"}
 COLUMNS = {"light": "light", "flip": "flip", "l1": "l1_per_1024x512"}
@@ -84,11 +89,28 @@ def panel(axes, found, time, cold_time):
     axes.grid(color="0.9")
 
 
+def draw_peers(axes, path, metric):
+    """Peers as stars and denoised paths as a dotted curve; how many scenes they were judged on."""
+    with open(path, encoding="utf-8") as file:
+        record = json.load(file)
+    peers, curve = marks(record, metric)
+    scale = 100 if metric == "light" else 1
+    axes.plot([1e3 * time for _, time, _ in curve], [scale * error for *_, error in curve], ":", marker="P", color="#7f3c8d", markersize=6, linewidth=1.5)
+    for name, time, error in [*peers, *curve]:
+        if (name, time, error) in peers:
+            axes.plot(1e3 * time, scale * error, "*", color="#7f3c8d", markersize=11)
+        axes.annotate(name, (1e3 * time, scale * error), (7, 5), textcoords="offset points", fontsize=8, color="#7f3c8d")
+    return len(record["times"])
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("folder")
     parser.add_argument("--metric", choices=TITLES, default="light")
+    parser.add_argument("--peers", help="peers.json of `python -m peers`, to be drawn with it")
     a = parser.parse_args()
+    if a.peers and a.metric == "l1":
+        parser.error("--peers: peers are not judged by the paper's L1")
     record, clock, found = entries(a.folder, a.metric)
     device, made = record["device"], record["provenance"]
     figure, (here, there) = plt.subplots(1, 2, figsize=(12.8, 6.2), sharey=True, width_ratios=[3, 2], layout="constrained")
@@ -97,7 +119,8 @@ def main():
     here.plot([e["ms"] for e in paths], [mean(e["error"]) for e in paths], "k--o", markersize=3, linewidth=1)
     for e in paths:
         here.annotate(e["name"], (e["ms"], mean(e["error"])), (5, 3), textcoords="offset points", fontsize=8)
-    here.set_title(f"Measured: {device['adapter']}{' (a CPU driver, no GPU)' if device['software'] else ''}", loc="left")
+    beside = f"\npeers (stars, dotted) of {draw_peers(here, a.peers, a.metric)} scenes" if a.peers else ""
+    here.set_title(f"Measured: {device['adapter']}{' (a CPU driver, no GPU)' if device['software'] else ''}{beside}", loc="left")
     here.set(xlabel=f"time of a whole frame, ms ({'timestamps' if clock.startswith('gpu') else 'synchronised clock'})", ylabel=TITLES[a.metric])
     panel(there, found, "projected", "projected")
     there.set_title("MODELLED, NOT MEASURED: GTX 1050", loc="left", fontsize=9)

@@ -24,7 +24,7 @@ class Chart(unittest.TestCase):
                 with open(os.path.join(folder, "chart.svg"), encoding="utf-8") as file:
                     drawn[metric] = file.read()
         for svg in drawn.values():
-            for word in ("PROJECTED, NOT MEASURED", "a CPU driver, no GPU", "gather", "16 paths", "bouncelight chart"):
+            for word in ("MODELLED, NOT MEASURED", "a CPU driver, no GPU", "gather", "16 paths", "bouncelight chart"):
                 self.assertIn(word, svg)
         # A network on pictures has no light of its own.
         self.assertNotIn("paper on pictures", drawn["light"])

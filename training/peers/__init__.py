@@ -1,0 +1,1 @@
+"""What people would use instead of bouncelight, drawn and judged beside it: `python -m peers --help`."""
