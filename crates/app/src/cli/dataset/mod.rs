@@ -93,8 +93,7 @@ const SAMPLES: &str = "Samples";
 pub const EXAMPLES: &str = "\
 Examples:
   bouncelight dataset --rooms 2-9 --spp 256 --moments 1,2,8,pan --out data
-  bouncelight dataset --recipe home --rooms 0-99 --spp 256 --moments 1,8 --out data --shard 0/4
-  bouncelight dataset --recipe home --rooms 0-99 --spp 16 --moments 1,8 --gather rays=4000 --out data
+  bouncelight dataset --recipe home --rooms 0-99 --spp 16 --moments 1,8 --out data --shard 0/4
   bouncelight dataset --recipe scene --scene scene.glb --spp 256 --moments 1,8,20 --out data";
 
 #[derive(Debug, Clone, Copy, PartialEq, clap::ValueEnum)]
