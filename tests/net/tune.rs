@@ -2,9 +2,12 @@
 
 use crate::{TOLERANCE, cases, common, error, fixed, fixture, run_gpu, run_network};
 use bouncelight::net::format::Weights;
-use bouncelight::net::gpu::{KernelConfig, Network, Options, Setup, Source, Tuned, Variant};
+use bouncelight::net::gpu::{Choice, Facts, Kernel, KernelConfig, Network, Options, Setup, Source, Tuned, Variant};
+use bouncelight::net::graph::Shape;
+use bouncelight::net::plan::{self, Plan, Precision};
 use bouncelight::net::tune::{Cache, CacheError, MAX_TEXT, VERSION, tune};
 use bouncelight::wgpu::{AdapterInfo, Backend, DeviceType};
+use bouncelight_lab::network::cpu::{self, Tensor};
 use std::sync::Arc;
 
 const GOOD: &str = r#"{"version": 5, "devices": {"a | Vulkan | d 1": {"layer": {"permutation":
@@ -104,4 +107,39 @@ fn wishes_that_cannot_be_met_do_no_harm() {
     let network = Network::new(&gpu.device, &gpu.queue, &weights, size, options).unwrap();
     assert_eq!(network.kernels().next().unwrap().config, Some(wanted));
     assert!(error(&run_gpu(&gpu, &weights, &input, options), &reference) <= TOLERANCE);
+}
+
+/// What a GPU runs that nobody has tuned, a mixture of kernels, answers as the CPU reference does.
+#[test]
+fn the_shipped_network_runs_untuned_as_on_a_gpu() {
+    let Some(gpu) = common::gpu() else { return };
+    let weights = Weights::shipped().unwrap();
+    let shape = Shape { channels: weights.graph.input_channels, width: 128, height: 64 };
+    let wave = |i: usize| (i as f32 * 0.37).sin();
+    let input = Tensor { shape, data: (0..shape.channels as usize * 128 * 64).map(wave).collect() };
+    let reference = cpu::run(&weights, &input).unwrap();
+    let facts = Facts { software: false, half: false };
+    for (precision, tolerance) in [(Precision::F32, TOLERANCE), (Precision::F16, 2e-2)] {
+        let options = Options { precision, ..Options::default() };
+        let planned = plan::Options { precision, ..plan::Options::default() };
+        let plan = Plan::with(&weights.graph, 128, 64, &planned).unwrap();
+        let chosen =
+            |step| Kernel::choose(&plan, step, &Choice { variant: Variant::Auto, tuned: &Tuned::new(), facts });
+        let kernels: Vec<Kernel> = plan.steps.iter().map(chosen).collect();
+        let layers = kernels.iter().filter_map(|k| Some((k.layer?.to_string(), k.config?)));
+        let tuned: Arc<Tuned> = Arc::new(layers.collect());
+        // Of all kinds: cut into parts, whole, and not what a processor runs.
+        assert!(tuned.values().any(|c| c.parts > 1) && tuned.values().any(|c| c.parts == 1));
+        let network = Network::new(&gpu.device, &gpu.queue, &weights, [128, 64], Setup { options, tuned }).unwrap();
+        let runs: Vec<_> = network.kernels().map(|k| k.config).collect();
+        assert_eq!(runs, kernels.iter().map(|k| k.config).collect::<Vec<_>>());
+        let e = error(&run_network(&gpu, &network, &input), &reference);
+        println!("{precision:?}: {e:.1e}");
+        assert!(e <= tolerance, "{precision:?}: {e}");
+        let plain = Network::new(&gpu.device, &gpu.queue, &weights, [128, 64], options).unwrap();
+        assert_ne!(runs, plain.kernels().map(|k| k.config).collect::<Vec<_>>());
+    }
+    // Negative control: another input is told apart.
+    let other = Tensor { shape, data: input.data.iter().map(|x| 0.9 * x).collect() };
+    assert!(error(&cpu::run(&weights, &other).unwrap(), &reference) > 2e-2);
 }
