@@ -73,8 +73,8 @@ fn a_budget_changes_no_light() {
         let seeds = [1, 2].map(|seed| go_on(&gpu, &mut renderer(&gpu, rays, seed), &drawn, &scene.cameras[0], frames));
         seeds[0].iter().zip(&seeds[1]).map(|(a, b)| 0.5 * (a + b)).collect()
     };
-    let all = light(1.0, 160);
-    for (rays, frames) in [(0.5 * CELLS as f32, 40), (0.25 * CELLS as f32, 80), (0.125, 120)] {
+    let all = light(1.0, 100);
+    for (rays, frames) in [(0.5 * CELLS as f32, 40), (0.25 * CELLS as f32, 80), (0.125, 90)] {
         let found = light(rays, frames);
         let ratio = mean(&found) / mean(&all);
         println!("{rays}: {ratio:.4} of the light, {:.2} % off", 100.0 * difference(&found, &all));
@@ -82,7 +82,7 @@ fn a_budget_changes_no_light() {
     }
     // Negative control: a lamp that is a fifth weaker is seen.
     let weaker = room(16.0);
-    let found = go_on(&gpu, &mut renderer(&gpu, 1.0, 1), &uploaded(&gpu, &weaker), &scene.cameras[0], 160);
+    let found = go_on(&gpu, &mut renderer(&gpu, 1.0, 1), &uploaded(&gpu, &weaker), &scene.cameras[0], 100);
     assert!(mean(&found) / mean(&all) < 0.985);
 }
 
