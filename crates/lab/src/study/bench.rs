@@ -64,7 +64,7 @@ pub struct Measurement {
     /// nobody has measured, by [`Card::key`].
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub modelled: BTreeMap<String, Modelled>,
-    /// The same once the picture rests ([`Method::frames_to_rest`]).
+    /// The same once the picture rests ([`Method::frames_to_rest`](bouncelight::gi::Method::frames_to_rest)).
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub modelled_at_rest: BTreeMap<String, Modelled>,
     /// Draw calls, triangles and shadow maps of the last frame.

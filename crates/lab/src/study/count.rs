@@ -44,7 +44,7 @@ pub struct Still<'a> {
 /// # Errors
 /// [`CountError`].
 pub fn frame(gpu: &Gpu, still: Still<'_>, options: RendererOptions, frames: u32) -> Result<Vec<Cost>, CountError> {
-    Ok(self::frames(gpu, still, options, &[frames])?.pop().unwrap_or_default())
+    Ok(self::frames(gpu, still, options, &[frames.max(1)])?.pop().unwrap_or_default())
 }
 
 /// Draws frames of a still camera, and says what the compute passes of those numbered `at`, from 1
@@ -66,7 +66,7 @@ pub fn frames(gpu: &Gpu, still: Still<'_>, options: RendererOptions, at: &[u32])
     let mut renderer = Renderer::new(&gpu.device, &gpu.queue, size, options)?;
     let view = View::new(camera, size, [0.0; 2]);
     let mut found = Vec::new();
-    for number in 1..=at.last().copied().unwrap_or(1).max(1) {
+    for number in 1..=at.last().copied().unwrap_or(0) {
         let counts = at.contains(&number);
         if counts {
             count.begin(&gpu.device);
