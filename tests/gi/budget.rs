@@ -1,12 +1,13 @@
-//! Rays as a scene needs them: a budget is kept and changes no light; a picture at rest sends a fourth, and wakes at
-//! once.
+//! Rays as a scene needs them: a budget is kept and changes no light; a picture at rest is drawn in one frame of four,
+//! and wakes at once.
 
 use crate::common;
 use crate::gather::{go_on, uploaded};
 use crate::world::{self, GREY, HALF_CEILING, difference, mean};
 use bouncelight::gi::{Method, gather::Options, gather::RAYS_SENT};
-use bouncelight::gpu::{Gpu, readback};
-use bouncelight::render::Renderer;
+use bouncelight::gpu::{Gpu, readback, timing::Recorder};
+use bouncelight::gpu_scene::SceneGpu;
+use bouncelight::render::{Renderer, View, sampling};
 use bouncelight::scene::{Camera, LightKind, Scene};
 
 const SIZE: [u32; 2] = [128, 96];
@@ -86,46 +87,98 @@ fn a_budget_changes_no_light() {
     assert!(mean(&found) / mean(&all) < 0.985);
 }
 
-/// After so many frames at rest: rays a cell; how far light is off in the frame in which the lamp is dimmed to a half,
-/// and how far it was before; rays a cell in that frame.
-fn dimmed_after(gpu: &Gpu, frames: u32) -> (f64, [f64; 2], f64) {
+/// Draws so many frames, with jitter as temporal anti-aliasing has it where asked for; the last one's light.
+fn go(gpu: &Gpu, renderer: &mut Renderer, drawn: &SceneGpu, camera: &Camera, frames: u32, jitter: bool) -> Vec<f32> {
+    for i in 0..frames - 1 {
+        let offset = if jitter { sampling::offset(i, 1) } else { [0.0; 2] };
+        let mut encoder = gpu.device.create_command_encoder(&Default::default());
+        let view = View::new(camera, SIZE, offset).with_seed(i);
+        renderer.record(&mut Recorder::new(&mut encoder), &gpu.queue, drawn, &view).expect("the frame is drawn");
+        gpu.queue.submit([encoder.finish()]);
+    }
+    // Through the pixels' centres, so that pictures can be compared.
+    go_on(gpu, renderer, drawn, camera, 1)
+}
+
+/// What happened after some frames at rest.
+#[derive(Debug)]
+struct Dimmed {
+    /// Frames drawn, and rays a cell in the last one.
+    drawn: u32,
+    rays: f64,
+    /// How far light is off in the frame in which the lamp is dimmed to a half, how far it was before, and rays a
+    /// cell in that frame.
+    off: f64,
+    before: f64,
+    rays_at_once: f64,
+}
+
+fn dimmed_after(gpu: &Gpu, frames: u32, truth: &[f32], jitter: bool) -> Dimmed {
     let (scene, dimmed) = (room(20.0), room(10.0));
-    let (mut renderer, mut drawn) = (renderer(gpu, 1.0, 0), uploaded(gpu, &scene));
-    let before = go_on(gpu, &mut renderer, &drawn, &scene.cameras[0], frames);
-    let rest = rays_of(gpu, &renderer);
-    drawn.set_lights(&gpu.device, &gpu.queue, &dimmed);
-    let now = go_on(gpu, &mut renderer, &drawn, &scene.cameras[0], 1);
-    let rays = rays_of(gpu, &renderer);
-    let truth = go_on(gpu, &mut renderer, &drawn, &scene.cameras[0], 40);
-    (rest, [difference(&now, &truth), difference(&before, &truth)], rays)
+    let (mut renderer, mut uploaded) = (renderer(gpu, 1.0, 0), uploaded(gpu, &scene));
+    let before = difference(&go(gpu, &mut renderer, &uploaded, &scene.cameras[0], frames, jitter), truth);
+    let (drawn, rays) = (renderer.settled().expect("it settles"), rays_of(gpu, &renderer));
+    uploaded.set_lights(&gpu.device, &gpu.queue, &dimmed);
+    let off = difference(&go_on(gpu, &mut renderer, &uploaded, &scene.cameras[0], 1), truth);
+    Dimmed { drawn, rays, off, before, rays_at_once: rays_of(gpu, &renderer) }
+}
+
+/// Four rounds after `first` frames: which directions are traced again depends on the frame.
+fn round(gpu: &Gpu, first: u32, truth: &[f32], jitter: bool) -> (Vec<u32>, Dimmed) {
+    let all: Vec<_> = (first..first + 4).map(|frames| dimmed_after(gpu, frames, truth, jitter)).collect();
+    let mean = |part: fn(&Dimmed) -> f64| all.iter().map(part).sum::<f64>() / 4.0;
+    let mean = Dimmed {
+        drawn: 0,
+        rays: mean(|r| r.rays),
+        off: mean(|r| r.off),
+        before: mean(|r| r.before),
+        rays_at_once: mean(|r| r.rays_at_once),
+    };
+    (all.iter().map(|r| r.drawn).collect(), mean)
 }
 
 #[test]
-fn a_picture_at_rest_sends_a_fourth_of_its_rays_and_wakes_at_once() {
+fn a_picture_at_rest_does_less_and_wakes_at_once() {
     let Some(gpu) = common::gpu() else { return };
-    // Which directions are traced again depends on the frame: four are a round.
-    let round = |first: u32| {
-        let all: Vec<_> = (first..first + 4).map(|frames| dimmed_after(&gpu, frames)).collect();
-        let mean = |part: fn(&(f64, [f64; 2], f64)) -> f64| all.iter().map(part).sum::<f64>() / 4.0;
-        [mean(|r| r.0), mean(|r| r.1[0]), mean(|r| r.1[1]), mean(|r| r.2)]
-    };
-    let [awake, asleep] = [round(57), round(70)];
-    println!("rays a cell, off at once, off before, rays at once: {awake:.3?}, {asleep:.3?}");
-    assert!(awake[0] > 0.85 && (0.25..0.3).contains(&(asleep[0] / awake[0])));
-    // The lamp is followed as if there had been no rest, by every cell.
-    assert!(asleep[3] > 0.95 * awake[3] && asleep[1] < 1.15 * awake[1]);
-    // Negative control: what was there before is further off.
-    assert!(awake[2] > 1.5 * awake[1]);
+    let dimmed = room(10.0);
+    let truth = go_on(&gpu, &mut renderer(&gpu, 1.0, 0), &uploaded(&gpu, &dimmed), &dimmed.cameras[0], 60);
+    for jitter in [false, true] {
+        let [(drawn, awake), (drawn_at_rest, asleep)] = [57, 70].map(|first| round(&gpu, first, &truth, jitter));
+        println!("jitter {jitter}: {drawn:?} {awake:.3?}, {drawn_at_rest:?} {asleep:.3?}");
+        assert_eq!(drawn, [57, 58, 59, 60]);
+        if jitter {
+            assert_eq!(drawn_at_rest, [70, 71, 72, 73]);
+            assert!((0.25..0.3).contains(&(asleep.rays / awake.rays)));
+        } else {
+            assert_eq!(drawn_at_rest, [66, 66, 66, 67]);
+        }
+        // The lamp is followed as if there had been no rest, by every cell; nearly where only a fourth of the
+        // last frame's rays can be traced again.
+        assert!(asleep.rays_at_once > 0.95 * awake.rays_at_once);
+        assert!(asleep.off < if jitter { 1.2 } else { 1.15 } * awake.off);
+        // Negative control: what was there before is further off.
+        assert!(awake.rays > 0.85 && awake.before > 1.5 * awake.off);
+    }
 }
 
-/// Light of a picture at rest is that of one whose rays go on.
+/// Frames that are not drawn show the cells of the last one; light at rest is that of a picture that goes on.
 #[test]
 fn nothing_is_lost_at_rest() {
     let Some(gpu) = common::gpu() else { return };
     let scene = room(20.0);
     let drawn = uploaded(&gpu, &scene);
-    let mut renderer = renderer(&gpu, 1.0, 0);
-    let [before, later] = [60, 200].map(|frames| go_on(&gpu, &mut renderer, &drawn, &scene.cameras[0], frames));
-    println!("{:.2} % off", 100.0 * difference(&later, &before));
-    assert!(difference(&later, &before) < 0.02 && (mean(&later) / mean(&before) - 1.0).abs() < 0.003);
+    let gather = |rest| world::renderer(&gpu, SIZE, Method::Gather(Options { rest, ..Default::default() }));
+    let go_on = |rest, frames: &[u32]| {
+        let mut renderer = gather(rest);
+        frames.iter().map(|&n| go_on(&gpu, &mut renderer, &drawn, &scene.cameras[0], n)).collect::<Vec<_>>()
+    };
+    let (resting, going) = (go_on(true, &[65, 1, 2, 1, 131]), go_on(false, &[65, 1, 134]));
+    assert!(resting[0] == going[0] && resting[1] == resting[0] && resting[2] == resting[0]);
+    // Negative control: without rest the next frame is another.
+    assert!(going[1] != going[0] && resting[3] == going[1]);
+    let jittered = |rest| go(&gpu, &mut gather(rest), &drawn, &scene.cameras[0], 200, true);
+    for [asleep, awake] in [[resting[4].clone(), going[2].clone()], [jittered(true), jittered(false)]] {
+        println!("{:.2} % off", 100.0 * difference(&asleep, &awake));
+        assert!(difference(&asleep, &awake) < 0.02 && (mean(&asleep) / mean(&awake) - 1.0).abs() < 0.003);
+    }
 }

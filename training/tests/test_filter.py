@@ -131,11 +131,13 @@ class Alone(unittest.TestCase):
 
     def test_another_network_teaches(self):
         noisy = np.random.default_rng(1).gamma(2, 0.5, (3, 24, 24)).astype(np.float32)
-        piles = self.made_up([("a", "4", 4, noisy, np.ones_like(noisy))])
-        train.based(piles, train.POOLS)
 
         def slope(**teacher):
-            run = train.Run(train.Config(widths=(4, 8), batch=2, learning_rate=0.0, **teacher), "")
+            piles = self.made_up([("a", "4", 4, noisy, np.ones_like(noisy))])
+            config = train.Config(widths=(4, 8), batch=2, learning_rate=0.0, **teacher)
+            train.taught(piles, config)
+            train.based(piles, train.POOLS)
+            run = train.Run(config, "")
             run.train_step(piles, 0.0)
             return torch.cat([p.grad.flatten() for p in run.model.parameters()])
 

@@ -45,12 +45,22 @@ mod tests {
 
     /// The frames of a still view.
     fn frames() -> Vec<Frame> {
-        let events = Events { reset: false, resized: false, scene: 1, light_version: 1, scene_version: 1, view: 1 };
+        let events = Events {
+            reset: false,
+            resized: false,
+            scene: 1,
+            light_version: 1,
+            scene_version: 1,
+            view: 1,
+            shift: [0; 2],
+        };
         let mut schedule = Schedule::default();
-        let next = |_| {
-            let (frame, after) = schedule.next(&events, Rules { progressive: false, first_updates: 1 });
+        let next = |k| {
+            // Jittered: what rests sends a fourth of its rays.
+            let events = Events { shift: [k, 0], ..events };
+            let (frame, after) = schedule.next(&events, Rules { progressive: false, first_updates: 1, rest: true });
             schedule = after;
-            frame
+            frame.expect("it is drawn")
         };
         (0..200).map(next).collect()
     }

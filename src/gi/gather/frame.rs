@@ -7,7 +7,7 @@ use super::pass::Groups;
 use super::schedule::{CACHE_RESPONSIVE_FRAMES, CACHE_RESPONSIVE_HISTORY, Events, Frame, Rules};
 use super::store::{self, Store};
 use super::upsample::Upsampled;
-use super::{GatherGi, spp, work};
+use super::{GatherGi, Options, spp, work};
 use crate::gi::interface::{GiError, Inputs, Outputs, Rays};
 use crate::gi::stage;
 use crate::gi::stage::cells;
@@ -20,6 +20,12 @@ pub struct Accumulated {
     inputs: BoundInputs,
     /// F0 and roughness of pixels.
     specular: wgpu::TextureView,
+    /// None at rest, in frames that show the cells of the last one.
+    pub means: Option<Means>,
+}
+
+/// Cells' means that the spatial filters are to read.
+pub struct Means {
     /// Histories of cells, [`HISTORY`](super::HISTORY) bytes each: `History` of `history.wgsl`.
     pub histories: wgpu::Buffer,
     /// Group 1, and where the frame's parameters lie in it.
@@ -29,14 +35,9 @@ pub struct Accumulated {
     wide: bool,
 }
 
-impl Accumulated {
-    fn groups(&self) -> Groups<'_> {
-        Groups { inputs: &self.inputs, scene: &self.params, offset: self.offset }
-    }
-
-    /// Of passes of a thread a cell.
-    fn workgroups(&self) -> [u32; 3] {
-        work::of_grid(self.inputs.cells)
+impl Means {
+    fn groups<'a>(&'a self, inputs: &'a BoundInputs) -> Groups<'a> {
+        Groups { inputs, scene: &self.params, offset: self.offset }
     }
 }
 
@@ -61,7 +62,8 @@ impl GatherGi {
         guided: bool,
     ) -> Result<Accumulated, GiError> {
         let valid = self.validate(queue, inputs)?;
-        let rules = Rules { progressive: self.options.progressive, first_updates: self.options.first_updates };
+        let Options { progressive, first_updates, rest, .. } = self.options;
+        let rules = Rules { progressive, first_updates, rest };
         let events = Events {
             reset: inputs.reset,
             resized: self.cells.fit(inputs.size),
@@ -69,15 +71,19 @@ impl GatherGi {
             light_version: inputs.lights.map_or(0, |l| l.version),
             scene_version: valid.rays.scene.version(),
             view: valid.camera.view(),
+            shift: valid.camera.shift().map(f32::to_bits),
         };
         let (frame, schedule) = self.schedule.next(&events, rules);
-        if frame.restart {
-            self.restart(inputs.size);
-        }
-        let params = self.params(inputs, &valid, guided, &frame);
-        let accumulated = self.record_frame(recorder, queue, inputs, valid, &frame, params);
+        let means = frame.map(|frame| {
+            if frame.restart {
+                self.restart(inputs.size);
+            }
+            let params = self.params(inputs, &valid, guided, &frame);
+            self.record_frame(recorder, queue, inputs, &valid, &frame, params)
+        });
         self.schedule = schedule;
-        Ok(accumulated)
+        let specular = inputs.specular.unwrap_or(&self.no_specular).clone();
+        Ok(Accumulated { inputs: valid.bound, specular, means })
     }
 
     /// Everything that can be wrong with `inputs`, before anything changes.
@@ -151,10 +157,10 @@ impl GatherGi {
         recorder: &mut Recorder<'_>,
         queue: &wgpu::Queue,
         inputs: &Inputs<'_>,
-        valid: Validated<'_>,
+        valid: &Validated<'_>,
         frame: &Frame,
         mut params: Params,
-    ) -> Accumulated {
+    ) -> Means {
         let scene = valid.rays.scene;
         let group = self.scene.group(bindings::Scene {
             gather: self.params.bound(),
@@ -249,28 +255,39 @@ impl GatherGi {
             self.specular_trace.record(recorder, with_scene(offset), own, work::of_grid(work::halved(inputs.size)));
         }
         self.accumulate.record(recorder, alone(offset), temporal, of_cells);
-        Accumulated {
-            histories: store.histories[((frame.number + 1) & 1) as usize].clone(),
-            specular: inputs.specular.unwrap_or(&self.no_specular).clone(),
-            inputs: valid.bound,
-            params: frame_params,
-            offset,
-            wide: frame.wide_blur,
-        }
+        let histories = store.histories[((frame.number + 1) & 1) as usize].clone();
+        Means { histories, params: frame_params, offset, wide: frame.wide_blur }
     }
 
     /// Records `gi.blur`, whose anti-lag test the next frame reads.
     pub(super) fn blur(&mut self, recorder: &mut Recorder<'_>, accumulated: &Accumulated, guidance: Bound) {
+        let Accumulated { inputs, means: Some(means), .. } = accumulated else { return };
         let store = &self.store;
         let own = bindings::Blur {
-            histories: (&accumulated.histories).into(),
+            histories: (&means.histories).into(),
             light_blurred: (&store.light_blurred).into(),
             changes: (&store.changes).into(),
             specular_blurred: (&store.specular_blurred).into(),
             guidance,
         };
-        let blur = if accumulated.wide { &mut self.blur_wide } else { &mut self.blur };
-        blur.record(recorder, accumulated.groups(), own, accumulated.workgroups());
+        let blur = if means.wide { &mut self.blur_wide } else { &mut self.blur };
+        blur.record(recorder, means.groups(inputs), own, work::of_grid(inputs.cells));
+    }
+
+    fn atrous(&mut self, recorder: &mut Recorder<'_>, accumulated: &Accumulated, guidance: Bound) {
+        let Accumulated { inputs, means: Some(means), .. } = accumulated else { return };
+        let store = &self.store;
+        let own = bindings::Atrous {
+            histories: (&means.histories).into(),
+            light_blurred: (&store.light_blurred).into(),
+            cell_light: (&store.cell_light).into(),
+            guidance,
+            specular_blurred: (&store.specular_blurred).into(),
+            specular_filtered: (&store.specular_filtered).into(),
+        };
+        // Of 32×32 cells each of sixteen workgroups has those that are four apart.
+        let [w, h] = inputs.cells.map(|n| 4 * n.div_ceil(32));
+        self.atrous.record(recorder, means.groups(inputs), own, [w, h, 1]);
     }
 
     /// Records the rest of the frame: means averaged over neighbours, upsampled to full size.
@@ -284,18 +301,8 @@ impl GatherGi {
     ) {
         let guidance = guidance.unwrap_or_else(|| Bound::from(&self.no_guidance));
         self.blur(recorder, accumulated, guidance.clone());
+        self.atrous(recorder, accumulated, guidance);
         let store = &self.store;
-        let own = bindings::Atrous {
-            histories: (&accumulated.histories).into(),
-            light_blurred: (&store.light_blurred).into(),
-            cell_light: (&store.cell_light).into(),
-            guidance,
-            specular_blurred: (&store.specular_blurred).into(),
-            specular_filtered: (&store.specular_filtered).into(),
-        };
-        // Of 32×32 cells each of sixteen workgroups has those that are four apart.
-        let [w, h] = accumulated.inputs.cells.map(|n| 4 * n.div_ceil(32));
-        self.atrous.record(recorder, accumulated.groups(), own, [w, h, 1]);
         let upsampled = Upsampled {
             cell_light: &store.cell_light,
             specular_filtered: &store.specular_filtered,

@@ -32,7 +32,7 @@ mod work;
 pub use frame::Accumulated;
 pub use options::{Options, OptionsError};
 pub use params::Params;
-pub use schedule::FRAMES_TO_REST;
+pub use schedule::{FRAMES_TO_REST, REST_PERIOD};
 
 use crate::gi::interface::technique::{Memory, Technique};
 use crate::gi::interface::{GiError, Inputs, Outputs};

@@ -34,6 +34,10 @@ pub struct Options {
     /// a number that holds from the first frame on, but for cells without a history, which send one.
     /// Few: noise, and light that follows changes slowly. Without effect where `progressive`.
     pub rays: f32,
+    /// Less is done once neither camera nor scene has changed for
+    /// [`FRAMES_TO_REST`](super::FRAMES_TO_REST) frames: a fourth of the rays under jitter, else three
+    /// frames in four show the cells of the last one. Off: all frames take as long.
+    pub rest: bool,
     /// Seed of the cells' rays: other noise, same light.
     pub seed: u32,
 }
@@ -50,6 +54,7 @@ impl Default for Options {
             progressive: false,
             caustics: true,
             rays: 1.0,
+            rest: true,
             seed: 0,
         }
     }
@@ -68,6 +73,7 @@ impl Options {
         progressive: true,
         caustics: true,
         rays: 1.0,
+        rest: true,
         seed: 0,
     };
 }
@@ -88,6 +94,7 @@ impl Options {
                 ("progressive", flag(o.progressive)),
                 ("caustics", flag(o.caustics)),
                 ("rays", o.rays),
+                ("rest", flag(o.rest)),
                 ("seed", o.seed as f32),
             ]
         };
@@ -112,7 +119,7 @@ pub enum OptionsError {
     /// No such number.
     #[error(
         "`{0}` is none of: plain, cell_frames=N, entry_frames=N, slots=N, entry_scale=X, first_updates=N, \
-         blur=0|1, progressive=0|1, caustics=0|1, rays=all|X|N, seed=N"
+         blur=0|1, progressive=0|1, caustics=0|1, rays=all|X|N, rest=0|1, seed=N"
     )]
     Unknown(String),
     /// A value that cannot be.
@@ -153,6 +160,7 @@ impl FromStr for Options {
                 "caustics" => options.caustics = number != 0.0,
                 "rays" if number > 0.0 && number <= 16_777_216.0 => options.rays = number,
                 "rays" => return Err(wrong("must be all, a share up to 1, or a number up to 16777216")),
+                "rest" => options.rest = number != 0.0,
                 // What a float counts exactly.
                 "seed" if (0.0..=16_777_216.0).contains(&number) => options.seed = number as u32,
                 "seed" => return Err(wrong("must be a whole number up to 16777216")),
@@ -174,7 +182,7 @@ mod tests {
         for options in [
             read,
             Options::PLAIN,
-            Options { caustics: false, entry_scale: 0.1, rays: 0.5, seed: 7, ..Default::default() },
+            Options { caustics: false, entry_scale: 0.1, rays: 0.5, rest: false, seed: 7, ..Default::default() },
         ] {
             assert_eq!(options.words().unwrap().parse(), Ok(options));
         }

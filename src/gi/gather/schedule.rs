@@ -27,6 +27,9 @@ const WIDE_BLUR_FRAMES: u32 = 5;
 /// Frames of an unchanged scene seen by a still camera after which a picture rests.
 pub const FRAMES_TO_REST: u32 = 64;
 
+/// At rest one frame in so many is drawn, where jitter moves no pixel. The others show its cells again.
+pub const REST_PERIOD: u32 = 4;
+
 /// What a frame is drawn of.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Events {
@@ -40,8 +43,10 @@ pub(super) struct Events {
     pub light_version: u64,
     /// Version of its objects' places.
     pub scene_version: u64,
-    /// A number that differs whenever the camera does.
+    /// A number that differs whenever the camera does, but for jitter.
     pub view: u64,
+    /// How far jitter shifts the picture, as bits.
+    pub shift: [u32; 2],
 }
 
 /// What is asked of all frames.
@@ -51,6 +56,8 @@ pub(super) struct Rules {
     pub progressive: bool,
     /// Cache updates in a first frame, at least 1.
     pub first_updates: u32,
+    /// Whether a picture may rest.
+    pub rest: bool,
 }
 
 /// What a frame does.
@@ -58,7 +65,7 @@ pub(super) struct Rules {
 pub(super) struct Frame {
     /// No history holds: buffers are made anew.
     pub restart: bool,
-    /// Frames since the last reset; 0 for the first.
+    /// Frames drawn since the last reset; 0 for the first.
     pub number: u32,
     /// Number of its first cache update, of all updates so far.
     pub iteration: u32,
@@ -76,7 +83,8 @@ pub(super) struct Frame {
     pub frames_since_change: Option<u32>,
     /// The wide blur is used.
     pub wide_blur: bool,
-    /// Nothing has changed for long: a fourth of the rays suffices.
+    /// Nothing has changed for long but for jitter: a fourth of the rays suffices. Other pixels have
+    /// other surfaces, so all filters are needed.
     pub rest: bool,
 }
 
@@ -91,7 +99,8 @@ pub(super) struct Schedule {
     light_version: u64,
     scene_version: u64,
     view: u64,
-    /// Frames since anything changed.
+    shift: [u32; 2],
+    /// Frames since anything changed but for jitter.
     still: u32,
     /// Frames left of [`ANTILAG_FRAMES`], and of [`CACHE_RESPONSIVE_FRAMES`] for entries and for
     /// cells.
@@ -101,8 +110,9 @@ pub(super) struct Schedule {
 }
 
 impl Schedule {
-    /// What the next frame does, and the schedule after it.
-    pub fn next(&self, events: &Events, rules: Rules) -> (Frame, Schedule) {
+    /// What the next frame does, and the schedule after it; `None` where it shows the cells of the last
+    /// one that was drawn.
+    pub fn next(&self, events: &Events, rules: Rules) -> (Option<Frame>, Schedule) {
         let mut after = *self;
         // A new scene starts at the same cache update, so it gets the same rays whatever was drawn
         // before.
@@ -130,6 +140,11 @@ impl Schedule {
         }
         let still = number > 0 && !changed && events.view == self.view;
         after.still = if still { self.still + 1 } else { 0 };
+        let rests = rules.rest && !rules.progressive && after.still >= FRAMES_TO_REST && after.changing_left == 0;
+        let jittered = events.shift != self.shift;
+        if rests && !jittered && after.still % REST_PERIOD != 0 {
+            return (None, after);
+        }
         let updates = match (number, after.responsive_left) {
             (0, _) => rules.first_updates.max(1),
             _ if first_change => UPDATES_ON_CHANGE,
@@ -149,7 +164,7 @@ impl Schedule {
             all_entries: number == 0 || after.responsive_left > 0 || rules.progressive,
             frames_since_change: (after.changing_left > 0).then(|| CACHE_RESPONSIVE_FRAMES - after.changing_left),
             wide_blur: number < WIDE_BLUR_FRAMES,
-            rest: after.still >= FRAMES_TO_REST && after.changing_left == 0 && !rules.progressive,
+            rest: rests && jittered,
         };
         let after = Schedule {
             frames: number + 1,
@@ -159,15 +174,16 @@ impl Schedule {
             light_version: events.light_version,
             scene_version: events.scene_version,
             view: events.view,
+            shift: events.shift,
             still: after.still,
             antilag_left: after.antilag_left.saturating_sub(1),
             responsive_left: after.responsive_left.saturating_sub(1),
             changing_left: after.changing_left.saturating_sub(1),
         };
-        (frame, after)
+        (Some(frame), after)
     }
 
-    /// Frames since the last reset.
+    /// Frames drawn since the last reset.
     pub fn frames(&self) -> u32 {
         self.frames
     }
@@ -182,12 +198,17 @@ impl Schedule {
 mod tests {
     use super::*;
 
-    const RULES: Rules = Rules { progressive: false, first_updates: 4 };
+    const RULES: Rules = Rules { progressive: false, first_updates: 4, rest: true };
     const STILL: Events =
-        Events { reset: false, resized: false, scene: 7, light_version: 1, scene_version: 1, view: 1 };
+        Events { reset: false, resized: false, scene: 7, light_version: 1, scene_version: 1, view: 1, shift: [0; 2] };
 
     /// The frames that `events` lead to, one after the other.
     fn frames(events: &[Events], rules: Rules) -> Vec<Frame> {
+        drawn(events, rules).into_iter().flatten().collect()
+    }
+
+    /// The same with those that show the last one's cells.
+    fn drawn(events: &[Events], rules: Rules) -> Vec<Option<Frame>> {
         let mut schedule = Schedule::default();
         let mut next = |e| {
             let (frame, after) = schedule.next(e, rules);
@@ -252,27 +273,37 @@ mod tests {
         let mut schedule = Schedule::default();
         schedule = schedule.next(&STILL, RULES).1;
         schedule.reset_history();
-        assert_eq!((schedule.frames(), schedule.next(&STILL, RULES).0.number), (0, 0));
+        assert_eq!((schedule.frames(), schedule.next(&STILL, RULES).0.map(|f| f.number)), (0, Some(0)));
     }
 
     #[test]
     fn a_picture_rests_when_nothing_has_changed_for_long() {
-        let rests = |change: fn(&mut Events), progressive| {
+        let rests = |change: fn(&mut Events), rules| {
             let mut events = [STILL; 200];
             events[100..].iter_mut().for_each(change);
-            frames(&events, Rules { progressive, ..RULES }).iter().map(|f| f.rest).collect::<Vec<_>>()
+            drawn(&events, rules).iter().map(Option::is_none).collect::<Vec<_>>()
         };
         let first = |found: &[bool]| found.iter().position(|&r| r);
-        let still = rests(|_| (), false);
-        assert_eq!(first(&still), Some(64));
-        assert!(still[64..].iter().all(|&r| r));
+        let still = rests(|_| (), RULES);
+        assert_eq!(first(&still), Some(65), "after a last one that is drawn");
+        assert!(still[64..].chunks(4).all(|four| four == [false, true, true, true]));
         for change in [(|e| e.view = 2) as fn(&mut Events), |e| e.light_version = 2, |e| e.scene_version = 2] {
-            let found = rests(change, false);
-            assert!(found[99] && !found[100]);
-            assert_eq!(first(&found[100..]), Some(64));
+            let found = rests(change, RULES);
+            assert!(found[99] && !found[100], "a change is drawn in its own frame");
+            assert_eq!(first(&found[100..]), Some(65));
         }
-        // What is asked to converge goes on.
-        assert_eq!(first(&rests(|_| (), true)), None);
+        // What is drawn goes on as if there had been no rest.
+        let all = frames(&[STILL; 200], RULES);
+        assert!(all.len() == 98 && all.windows(2).all(|pair| pair[1].number == pair[0].number + 1));
+        // Under jitter all are drawn, and send a fourth of their rays.
+        let mut jittered = [STILL; 200];
+        (0..200).for_each(|i| jittered[i].shift = [i as u32 % 8, 0]);
+        let found = frames(&jittered, RULES);
+        assert!(found.len() == 200 && found.iter().all(|f| f.rest == (f.number >= 64)));
+        assert!(all.iter().all(|f| !f.rest));
+        // What is asked to converge goes on, and what is asked not to rest.
+        assert_eq!(first(&rests(|_| (), Rules { progressive: true, ..RULES })), None);
+        assert_eq!(first(&rests(|_| (), Rules { rest: false, ..RULES })), None);
     }
 
     #[test]

@@ -112,9 +112,19 @@ impl Method {
         if self.has_history() { Self::SETTLED + 16 } else { 1 }
     }
 
-    /// Frames of a still camera after which a picture rests, and sends a fourth of its rays.
+    /// Frames of a still camera after which a picture rests. Without jitter
+    /// [`gather::REST_PERIOD`] frames are a round then, in which one is drawn.
     pub fn frames_to_rest(&self) -> u32 {
-        if self.has_history() { super::gather::FRAMES_TO_REST + 8 } else { 1 }
+        if self.has_history() { gather::FRAMES_TO_REST + gather::REST_PERIOD } else { 1 }
+    }
+
+    /// The same method that never rests, so that all frames of a still camera take as long.
+    #[must_use]
+    pub fn without_rest(mut self) -> Self {
+        if let Some(options) = self.gather_mut() {
+            options.rest = false;
+        }
+        self
     }
 
     /// The method's name on the command line.

@@ -152,10 +152,12 @@ impl Technique for FilterGi {
         self.fit(inputs.size)?;
         let lit = self.inputs.bind(queue, inputs)?;
         let accumulated = self.gather.accumulate(recorder, queue, inputs, true)?;
-        self.exposure.record(recorder, &lit);
-        let known = (&accumulated.histories, &self.exposure);
-        self.features.record(recorder, &lit, known, bound(self.network.input()));
-        self.network.record(recorder);
+        if let Some(means) = &accumulated.means {
+            self.exposure.record(recorder, &lit);
+            let known = (&means.histories, &self.exposure);
+            self.features.record(recorder, &lit, known, bound(self.network.input()));
+            self.network.record(recorder);
+        }
         self.gather.filter(recorder, &accumulated, Some(bound(self.network.output())), outputs);
         Ok(())
     }

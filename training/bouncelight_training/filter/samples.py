@@ -1,5 +1,6 @@
 """What `bouncelight dataset --moments` writes: one safetensors file a view (crates/lab/src/study/moments.rs)."""
 import concurrent.futures
+import functools
 import glob
 import multiprocessing
 import os
@@ -85,21 +86,21 @@ def all_of(path):
         raise TrainingError(f"{path}: not a sample of a filter: {error}; make it with bouncelight dataset --moments") from error
 
 
-def moments_of(path):
-    """The moments of a view that teach something: none of pictures without light, or with more noise than light."""
-    return [sample for sample in all_of(path) if sample.mean > 1e-6 and sample.mask.mean() > 0.2 and sample.noise < MOST_NOISE]
+def moments_of(path, most_noise=MOST_NOISE):
+    """The moments of a view that teach something: none of pictures without light, or with more noise than that."""
+    return [sample for sample in all_of(path) if sample.mean > 1e-6 and sample.mask.mean() > 0.2 and sample.noise < most_noise]
 
 
-def read(folder, every=1):
+def read(folder, every=1, most_noise=MOST_NOISE):
     """All moments of the views of a folder, or of one view in so many. Many views are read by as many processes as there are cores."""
     paths = sorted(glob.glob(os.path.join(folder, "*.safetensors")))[::every]
     if not paths:
         raise TrainingError(f"{folder}: no samples; make them with bouncelight dataset --moments")
     if len(paths) < MANY:
-        return [sample for path in paths for sample in moments_of(path)]
+        return [sample for path in paths for sample in moments_of(path, most_noise)]
     # Forked, which is quick, since nothing of torch has run yet that has threads.
     with concurrent.futures.ProcessPoolExecutor(mp_context=multiprocessing.get_context("fork")) as pool:
-        return [sample for samples in pool.map(moments_of, paths, chunksize=4) for sample in samples]
+        return [sample for samples in pool.map(functools.partial(moments_of, most_noise=most_noise), paths, chunksize=4) for sample in samples]
 
 
 def stacked(samples, device="cpu"):
@@ -121,6 +122,7 @@ class Pile:
     def __init__(self, samples, device="cpu"):
         self.samples, self.fields = samples, stacked(samples, device)
         self.based_on = None  # squares of cells over which the losses of `gather` are that it holds
+        self.taught_by = None  # weights file whose light is mixed into its targets, and how much of it
         # Of each the moment that is its next frame by a still camera, -1 where there is none.
         places = {(sample.name, sample.age): i for i, sample in enumerate(samples) if sample.when.isdigit()}
         self.later = np.array([places.get((sample.name, sample.age + 1), -1) if sample.when.isdigit() else -1 for sample in samples])

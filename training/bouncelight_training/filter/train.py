@@ -219,7 +219,6 @@ class Run:
     def __init__(self, config, folder):
         self.config, self.folder = config, folder
         self.model, self.channels, self.parts = network(config).to(config.device), kept_channels(config), kept_parts(config)
-        self.teacher = network_of(config.teacher).to(config.device).eval() if config.teacher else None
         self.average = {k: v.detach().clone() for k, v in self.model.state_dict().items()}
         self.optimiser = torch.optim.AdamW(self.model.parameters(), lr=config.learning_rate, weight_decay=config.weight_decay)
         self.step, self.seconds, self.rows, self.best = 0, 0.0, [], (float("inf"), None)
@@ -273,11 +272,6 @@ class Run:
         # Beside each its next frame, if there is one.
         followed = np.flatnonzero(pile.later[chosen] >= 0) if c.flicker else []
         batch = augmented(pile.taken(np.concatenate([chosen, pile.later[chosen[followed]]]), window(pile, c.crop, rng)), rng)
-        if self.teacher:
-            # Less noisy than the target, and of all views that it has seen.
-            with torch.no_grad():
-                light = blur.filtered(batch, self.teacher(batch["features"]))[0].clamp(min=0)
-            batch["target"] = torch.lerp(batch["target"], light, c.taught)
         answer = self.model(batch["features"] * self.channels) * self.parts
         shown, first = blur.filtered(batch, answer)
         learnt = [batch[k] for k in ("target", "mask", "mean", "noise")]
@@ -313,12 +307,31 @@ def read_checkpoint(path):
 def piles_of(config, same_names=False):
     """What is learnt and what is held out. Views of the same name are the same view, unless `same_names` are meant to be allowed."""
     torch.set_num_threads(config.threads)
-    views = [sample for name in config.train.split(",") for sample in samples.read(name, config.every)]
+    # What a teacher says has no noise.
+    most = samples.MOST_NOISE / max(1 - config.taught, 1e-6) if config.teacher else samples.MOST_NOISE
+    views = [sample for name in config.train.split(",") for sample in samples.read(name, config.every, most)]
     held_out = samples.read(config.validation)
     shared = {v.name for v in views} & {v.name for v in held_out}
     if shared and not same_names:
         raise TrainingError(f"{sorted(shared)[0]} stands in training and validation")
     return samples.piles(views, config.device), samples.piles(held_out, config.device)
+
+
+def taught(piles, config):
+    """Mixes the light that another network's filter shows into the targets: it is less noisy, and of all views that the network has seen."""
+    if not config.teacher or not config.taught:
+        return
+    teacher = network_of(config.teacher).to(config.device).eval()
+    with torch.no_grad():
+        for pile in piles:
+            if pile.taught_by == (config.teacher, config.taught):
+                continue
+            if pile.taught_by:
+                raise TrainingError(f"views are mixed with the light of {pile.taught_by[0]} already")
+            light = [blur.filtered(batch, teacher(batch["features"]))[0].clamp(min=0) for _, batch in in_parts(pile)]
+            pile.fields["target"] = torch.lerp(pile.fields["target"], torch.cat(light), config.taught)
+            pile.fields["noise"] = pile.fields["noise"] * (1 - config.taught)
+            pile.taught_by, pile.based_on = (config.teacher, config.taught), None
 
 
 def based(piles, pools):
@@ -349,6 +362,7 @@ def train(config, folder, same_names=False, read=None):
     run.load()
     with open(os.path.join(folder, "config.json"), "w") as file:
         json.dump(dataclasses.asdict(config), file, indent=1)
+    taught(piles, config)
     based(piles, config.pools)
     count = sum(len(pile.samples) for pile in piles)
     print(f"{parameter_count(run.model)} parameters, {flops(run.model, 128, 256) / 1e9:.3f} GFLOP at 256x128 cells; {count} training and "

@@ -8,7 +8,7 @@ use super::{
     scene_args::SceneArgs,
 };
 use anyhow::{Context, Result};
-use bouncelight::gi::Method;
+use bouncelight::gi::{Method, gather::REST_PERIOD};
 use bouncelight::gpu::Gpu;
 use bouncelight::gpu_scene::SceneGpu;
 use bouncelight::render::{DrawnCount, Renderer, RendererOptions, cull::Count};
@@ -157,18 +157,22 @@ pub fn run(global: &Global, args: Args) -> Result<()> {
     }
     let options = BenchOptions { frames: args.frames, warmup: args.warmup };
     let with = |method: &Method| RendererOptions { method: method.clone(), ..Default::default() };
-    let make = |method| Renderer::new(&gpu.device, &gpu.queue, args.scene.size, with(method));
+    let make =
+        |method: &Method| Renderer::new(&gpu.device, &gpu.queue, args.scene.size, with(&method.clone().without_rest()));
     let mut renderers = methods.iter().map(make).collect::<Result<Vec<_>, _>>()?;
     let turn = |renderer| measure(&gpu, renderer, &uploaded, &camera, options);
     let mut measured = renderers.iter_mut().map(turn).collect::<Result<Vec<Measurement>, _>>()?;
     if args.count {
         for (method, measured) in methods.iter().zip(&mut measured) {
             let still = count::Still { scene: &scene, camera: &camera, size: args.scene.size };
-            let at = [method.frames_to_steady(), method.frames_to_rest()];
-            let mut counted = count::frames(&gpu, still, with(method), &at)?.into_iter();
-            let steady = counted.next().unwrap_or_default();
+            let mut at = vec![method.frames_to_steady()];
+            if method.has_history() {
+                at.extend((1..=REST_PERIOD).map(|k| method.frames_to_rest() + k));
+            }
+            let mut counted = count::frames(&gpu, still, with(method), &at)?;
+            let steady = counted.remove(0);
             // A method without history has one kind of frame.
-            let rest = counted.next().unwrap_or_else(|| steady.clone());
+            let rest = if counted.is_empty() { vec![steady.clone()] } else { counted };
             *measured = measured.clone().with_costs(steady, &rest);
         }
     }

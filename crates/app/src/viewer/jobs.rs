@@ -254,7 +254,8 @@ pub fn renderer(handles: &Handles, plan: Plan, progress: &Progress) -> Result<Pr
     progress.stage(&format!("building {}", plan.key.0.name()));
     let rays = method.needs_rays();
     let scope = handles.device.push_error_scope(wgpu::ErrorFilter::Validation);
-    let options = RendererOptions { method, ..Default::default() };
+    // A still window stops drawing; where it is asked to go on, frames are to be timed.
+    let options = RendererOptions { method: method.without_rest(), ..Default::default() };
     let built = Renderer::new(&handles.device, &handles.queue, plan.size, options);
     if let Some(e) = pollster::block_on(scope.pop()) {
         return Err(bouncelight::gpu::shaders::located(&e.to_string()));

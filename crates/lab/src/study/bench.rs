@@ -57,14 +57,15 @@ pub struct Measurement {
     /// Resident GPU bytes by owner.
     #[serde(deserialize_with = "crate::labels::read_rows")]
     pub bytes: Vec<(String, u64)>,
-    /// What passes of a frame at rest do, where somebody has counted it (`study::count`).
+    /// What passes of a steady frame do, where somebody has counted it (`study::count`).
     #[serde(default)]
     pub costs: Vec<Cost>,
     /// What the counted passes that find and add indirect light are modelled to take on cards that
     /// nobody has measured, by [`Card::key`].
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub modelled: BTreeMap<String, Modelled>,
-    /// The same once the picture rests ([`Method::frames_to_rest`](bouncelight::gi::Method::frames_to_rest)).
+    /// The same once the picture rests ([`Method::frames_to_rest`](bouncelight::gi::Method::frames_to_rest)):
+    /// the mean of a round of frames, in which one is drawn.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub modelled_at_rest: BTreeMap<String, Modelled>,
     /// Draw calls, triangles and shadow maps of the last frame.
@@ -73,17 +74,18 @@ pub struct Measurement {
 }
 
 /// What the passes that find and add indirect light are modelled to take on cards that nobody has
-/// measured.
-fn on_cards(costs: &[Cost]) -> BTreeMap<String, Modelled> {
-    let own = || costs.iter().filter(|c| is_indirect(&c.pass));
-    [GTX_1050, GTX_1650].map(|card: Card| (card.key.to_owned(), modelled(own(), &card))).into()
+/// measured, in the mean of `frames`.
+fn on_cards(frames: &[Vec<Cost>]) -> BTreeMap<String, Modelled> {
+    let own = || frames.iter().flatten().filter(|c| is_indirect(&c.pass));
+    let mean = |card: Card| (card.key.to_owned(), modelled(own(), &card) / frames.len() as f64);
+    [GTX_1050, GTX_1650].map(mean).into()
 }
 
 impl Measurement {
-    /// The same with what was counted of it, and of a frame of a picture that rests.
+    /// The same with what was counted of it, and of the frames of a picture that rests.
     #[must_use]
-    pub fn with_costs(mut self, costs: Vec<Cost>, at_rest: &[Cost]) -> Self {
-        self.modelled = on_cards(&costs);
+    pub fn with_costs(mut self, costs: Vec<Cost>, at_rest: &[Vec<Cost>]) -> Self {
+        self.modelled = on_cards(std::slice::from_ref(&costs));
         self.modelled_at_rest = on_cards(at_rest);
         self.costs = costs;
         self

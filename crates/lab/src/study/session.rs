@@ -264,7 +264,7 @@ impl<'a> Session<'a> {
         Ok(())
     }
 
-    /// What the method costs here, frame after frame of a still camera.
+    /// What the method costs here, frame after frame of a still camera, at no time at rest.
     ///
     /// # Errors
     /// [`SessionError`].
@@ -274,7 +274,7 @@ impl<'a> Session<'a> {
         camera: &Camera,
         options: BenchOptions,
     ) -> Result<Measurement, SessionError> {
-        let mut renderer = self.renderer(method)?;
+        let mut renderer = self.renderer(&method.clone().without_rest())?;
         Ok(bench::measure(self.gpu, &mut renderer, &self.uploaded, camera, options)?)
     }
 

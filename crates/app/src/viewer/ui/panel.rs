@@ -214,8 +214,7 @@ fn method(ui: &mut Ui, state: &mut State, memory: &mut Memory, facts: &Facts<'_>
 }
 
 const RAYS: &str = "Share of one ray for each 4×4 pixels that a frame sends, of methods that trace rays. Few: faster frames, but \
-    noise, and light that follows changes slowly. The first 16 frames of a view always send all, and a view at rest \
-    sends a fourth by itself.";
+    noise, and light that follows changes slowly. The first 33 frames of a view always send all.";
 
 /// A place for each share; what is between them stands where it is nearest.
 fn rays(ui: &mut Ui, state: &mut State, memory: &mut Memory) {

@@ -127,7 +127,7 @@ fn one(
     size: [u32; 2],
     seconds: f64,
 ) -> Result<(Measurement, u32), BenchError> {
-    let options = RendererOptions { method, ..Default::default() };
+    let options = RendererOptions { method: method.without_rest(), ..Default::default() };
     let mut renderer = Renderer::new(&gpu.device, &gpu.queue, size, options)?;
     // Drivers compile at a shader's first use.
     let pilot = measure(gpu, &mut renderer, uploaded, camera, BenchOptions { frames: 1, warmup: 1 })?;

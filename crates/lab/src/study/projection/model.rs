@@ -55,6 +55,14 @@ pub struct Modelled {
     pub most: f64,
 }
 
+impl std::ops::Div<f64> for Modelled {
+    type Output = Self;
+
+    fn div(self, by: f64) -> Self {
+        Self { ms: self.ms / by, least: self.least / by, most: self.most / by }
+    }
+}
+
 impl std::fmt::Display for Modelled {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let digits = f.precision().unwrap_or(1);

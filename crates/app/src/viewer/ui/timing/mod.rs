@@ -24,8 +24,7 @@ const WEAK: Color32 = Color32::from_rgb(0xb0, 0xb0, 0xb0);
 const WARN: Color32 = Color32::from_rgb(0xff, 0xb4, 0x4c);
 /// Width of the whole overlay, points.
 const WIDTH: f32 = 384.0;
-const RAYS: &str =
-    "rays that the cells of a frame have sent, without those of the cache; a picture at rest sends a fourth";
+const RAYS: &str = "rays that the cells of a frame have sent, without those of the cache";
 /// Edge of the signs that unfold and close it, points.
 const SIGN: f32 = 16.0;
 
