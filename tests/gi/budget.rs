@@ -10,8 +10,8 @@ use bouncelight::gpu_scene::SceneGpu;
 use bouncelight::render::{Renderer, View, sampling};
 use bouncelight::scene::{Camera, LightKind, Scene};
 
-const SIZE: [u32; 2] = [128, 96];
-const CELLS: f64 = 32.0 * 24.0;
+const SIZE: [u32; 2] = [96, 64];
+const CELLS: f64 = 24.0 * 16.0;
 
 /// A room with half a ceiling under a sky, and a lamp.
 fn room(intensity: f32) -> Scene {
@@ -22,7 +22,7 @@ fn room(intensity: f32) -> Scene {
 }
 
 fn renderer(gpu: &Gpu, rays: f32, seed: u32) -> Renderer {
-    world::renderer(gpu, SIZE, Method::Gather(Options { rays, seed, ..Default::default() }))
+    world::renderer(gpu, SIZE, Method::Gather(Options { rays, seed, slots: world::FEW_SLOTS, ..Default::default() }))
 }
 
 /// Rays of the last frame's cells, a cell.
@@ -75,7 +75,7 @@ fn a_budget_changes_no_light() {
         seeds[0].iter().zip(&seeds[1]).map(|(a, b)| 0.5 * (a + b)).collect()
     };
     let all = light(1.0, 100);
-    for (rays, frames) in [(0.5 * CELLS as f32, 40), (0.25 * CELLS as f32, 80), (0.125, 90)] {
+    for (rays, frames) in [(0.5 * CELLS as f32, 40), (0.25 * CELLS as f32, 120), (0.125, 90)] {
         let found = light(rays, frames);
         let ratio = mean(&found) / mean(&all);
         println!("{rays}: {ratio:.4} of the light, {:.2} % off", 100.0 * difference(&found, &all));
@@ -167,7 +167,9 @@ fn nothing_is_lost_at_rest() {
     let Some(gpu) = common::gpu() else { return };
     let scene = room(20.0);
     let drawn = uploaded(&gpu, &scene);
-    let gather = |rest| world::renderer(&gpu, SIZE, Method::Gather(Options { rest, ..Default::default() }));
+    let gather = |rest| {
+        world::renderer(&gpu, SIZE, Method::Gather(Options { rest, slots: world::FEW_SLOTS, ..Default::default() }))
+    };
     let go_on = |rest, frames: &[u32]| {
         let mut renderer = gather(rest);
         frames.iter().map(|&n| go_on(&gpu, &mut renderer, &drawn, &scene.cameras[0], n)).collect::<Vec<_>>()

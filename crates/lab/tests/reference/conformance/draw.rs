@@ -50,12 +50,14 @@ pub struct Effort {
     pub paths: u32,
     /// Frames before the first sample, and samples, of the rasteriser.
     pub frames: [u32; 2],
+    /// Slots of `gather`'s cache.
+    pub slots: u32,
 }
 
-/// For the test.
-pub const QUICK: Effort = Effort { size: [64, 48], paths: 40, frames: [9, 8] };
+/// For the test: a small picture needs few slots.
+pub const QUICK: Effort = Effort { size: [64, 48], paths: 32, frames: [4, 4], slots: 4096 };
 /// For the page: what `render` draws.
-pub const PAGE: Effort = Effort { size: [128, 96], paths: 96, frames: [Method::SETTLED - 1, 8] };
+pub const PAGE: Effort = Effort { size: [128, 96], paths: 96, frames: [Method::SETTLED - 1, 8], slots: 1 << 16 };
 
 /// One renderer and one path tracer for all.
 pub struct Painter<'a> {
@@ -67,7 +69,8 @@ pub struct Painter<'a> {
 
 impl<'a> Painter<'a> {
     pub fn new(gpu: &'a Gpu, effort: Effort) -> Self {
-        let options = RendererOptions { method: Method::Gather(gather::Options::default()), ..Default::default() };
+        let method = Method::Gather(gather::Options { slots: effort.slots, ..Default::default() });
+        let options = RendererOptions { method, ..Default::default() };
         let renderer = Renderer::new(&gpu.device, &gpu.queue, effort.size, options).expect("the size is fine");
         Self { gpu, renderer, kernel: Kernel::new(&gpu.device), effort }
     }
