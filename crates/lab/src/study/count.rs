@@ -71,6 +71,7 @@ pub fn frames(gpu: &Gpu, still: Still<'_>, options: RendererOptions, at: &[u32])
         if counts {
             count.begin(&gpu.device);
         }
+        let before = renderer.settled();
         let mut encoder = gpu.device.create_command_encoder(&Default::default());
         renderer.record(&mut Recorder::new(&mut encoder), &gpu.queue, &uploaded, &view)?;
         gpu.queue.submit([encoder.finish()]);
@@ -81,7 +82,9 @@ pub fn frames(gpu: &Gpu, still: Still<'_>, options: RendererOptions, at: &[u32])
         }
         if counts {
             let mut costs = added_up(count.take(&gpu)?);
-            if let Some(plan) = renderer.plan() {
+            // A frame at rest that shows the last one's cells runs no network.
+            let rests = before.is_some() && renderer.settled() == before;
+            if let Some(plan) = renderer.plan().filter(|_| !rests) {
                 costs.extend(plan.steps.iter().map(|s| Cost::of_step(plan, s, &s.name)));
             }
             found.push(costs);

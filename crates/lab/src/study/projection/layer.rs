@@ -87,8 +87,11 @@ impl Cost {
         let links = if kernel.staged { 2.0 * own.ceil() } else { own };
         let sum = f64::from(kernel.parts > 1.0);
         let steps = PIXELS * kernel.vectors * 32.0 * own;
+        let done = kernel.threads * steps;
         Self {
-            waited: (kernel.threads * steps - self.flops).max(0.0),
+            // Fewer than the layer's where equal taps of an enlarged input are added up beforehand.
+            flops: self.flops.min(done),
+            waited: (done - self.flops).max(0.0),
             bytes: self.bytes + kernel.partial,
             dispatches: 1.0 + sum,
             threads: kernel.threads,
