@@ -3,7 +3,7 @@
 use super::args::{Global, PrecisionName, usage};
 use super::progress::Progress;
 use anyhow::Result;
-use bouncelight::gpu::{readback, timing::Recorder};
+use bouncelight::gpu::timing::Recorder;
 use bouncelight::net::{
     format::Weights,
     gpu::{NetError, Network, Options, Setup},
@@ -135,8 +135,7 @@ fn network(global: &Global, weights: &Weights, input: &Tensor, args: &Args) -> R
         Err(e @ (NetError::Plan(PlanError::TooLarge { .. }) | NetError::Limit { .. })) => return slow(&e),
         Err(e) => return Err(e.into()),
     };
-    let place = network.input();
-    gpu.queue.write_buffer(place.buffer, place.offset, bytemuck::cast_slice(&input.to_padded()));
+    pictures::upload(&gpu, &network, input);
     let plan = network.plan();
     if !global.quiet {
         let (gflop, mb) = (plan.flops() as f64 / 1e9, network.bytes() as f64 / 1e6);
@@ -153,10 +152,7 @@ fn network(global: &Global, weights: &Weights, input: &Tensor, args: &Args) -> R
         progress.step();
     }
     progress.finish();
-    let place = network.output();
-    let bytes = readback::buffer(&gpu.device, &gpu.queue, place.buffer, place.offset, place.size)?;
-    let shape = network.plan().tensors[network.plan().output].shape;
-    Ok(Tensor::from_padded(shape, &bytemuck::pod_collect_to_vec::<u8, f32>(&bytes)))
+    Ok(pictures::download(&gpu, &network)?)
 }
 
 /// A picture of 8 bits without transparency; an alpha channel that is 1 everywhere is left out.

@@ -12,6 +12,7 @@ pub mod hash;
 pub mod judge;
 pub mod layers;
 pub mod moments;
+mod on_pictures;
 pub mod projection;
 pub mod rays;
 pub mod session;

@@ -6,7 +6,6 @@
 //! what was written.
 
 pub mod entries;
-mod on_pictures;
 pub mod plan;
 pub mod published;
 pub mod report;

@@ -3,7 +3,6 @@
 use super::{
     Scores, Time,
     entries::Entry,
-    on_pictures,
     plan::Plan,
     published::{self, PIXELS},
 };
@@ -12,6 +11,7 @@ use crate::reference;
 use crate::study::{
     bench::{Measurement, Spread},
     judge::{self, LightError},
+    on_pictures,
     projection::Cost,
     session::{Frame, Session, Settling},
     truth::{self, Reference},

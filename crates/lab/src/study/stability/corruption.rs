@@ -2,6 +2,7 @@
 //! methods do wrong.
 
 use super::observation::Observation;
+use crate::study::judge::NOTHING;
 
 /// What is done to every frame that a test looks at.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -47,7 +48,7 @@ impl Corruption {
     pub(super) fn spoil(self, look: &mut Observation, number: u64, before: Option<&Observation>, passed: u32) {
         let [width, height] = look.size.map(|n| n as usize);
         let depth = &look.depth;
-        let is_surface = |pixel: usize| depth[pixel] < super::observation::NOTHING;
+        let is_surface = |pixel: usize| depth[pixel] < NOTHING;
         let before = [before.map(|b| &b.light), before.map(|b| &b.rgb)];
         for (values, old) in [&mut look.light, &mut look.rgb].into_iter().zip(before) {
             for (pixel, at) in values.chunks_exact_mut(3).enumerate() {

@@ -3,8 +3,7 @@
 use super::super::{Corruption, Limit, Observation, Script, StabilityError, Test, TestRun, measures, rooms};
 use super::{LONG, SMALL};
 use crate::metrics::{Picture, flip};
-use crate::study::session::Edits;
-use bouncelight::render::tonemap_curve::Tonemap;
+use crate::study::{judge, session::Edits};
 use bouncelight::scene::Camera;
 use glam::Vec3;
 
@@ -176,10 +175,7 @@ pub static DISOCCLUSION: Test = Test {
 fn after_uncovering(looks: &[Observation]) -> Result<[f64; 2], StabilityError> {
     let ring = measures::uncovered(&looks[0], &looks[1], 8);
     let gain = 0.2 / (looks[2].rgb.iter().sum::<f32>() / looks[2].rgb.len() as f32).max(1e-9);
-    let shown = |look: &Observation| -> Vec<f32> {
-        let linear: Vec<f32> = look.rgb.iter().map(|v| v * gain).collect();
-        Tonemap::Filmic.apply_to_bytes(&linear).into_iter().map(|b| f32::from(b) / 255.0).collect()
-    };
+    let shown = |look: &Observation| judge::shown(&look.rgb.iter().map(|v| v * gain).collect::<Vec<_>>());
     let (first, later) = (shown(&looks[1]), shown(&looks[2]));
     let [w, h] = looks[1].size.map(|n| n as usize);
     let pictures = (Picture::new("first", w, h, &first)?, Picture::new("later", w, h, &later)?);
