@@ -1,6 +1,6 @@
 //! `bouncelight apply`: a network on G-buffer pictures from elsewhere.
 
-use super::args::{Global, PrecisionName, usage};
+use super::args::{Global, PrecisionName, command_line, usage};
 use super::progress::Progress;
 use anyhow::Result;
 use bouncelight::gpu::timing::Recorder;
@@ -94,10 +94,9 @@ pub fn run(global: &Global, args: Args) -> Result<()> {
     let output = network(global, &weights, &input, &args)?;
     let shown = pictures::picture(&output);
     let bytes: Vec<u8> = shown.iter().map(|v| (v * 255.0).round() as u8).collect();
-    let command: Vec<String> = std::env::args().skip(1).collect();
     let metadata = [
         ("Software", format!("bouncelight {}", env!("CARGO_PKG_VERSION"))),
-        ("Command", format!("bouncelight {}", command.join(" "))),
+        ("Command", command_line()),
         ("Weights", weights.hash_text()),
     ];
     let metadata: image_io::Metadata = metadata.map(|(k, v)| (k.to_string(), v)).into();

@@ -233,6 +233,11 @@ pub fn load_weights(path: Option<&PathBuf>) -> Result<Weights> {
     Ok(Weights::find(path.map(PathBuf::as_path))?)
 }
 
+/// What was typed.
+pub fn command_line() -> String {
+    format!("bouncelight {}", std::env::args().skip(1).collect::<Vec<_>>().join(" "))
+}
+
 /// A usage error (exit code 2).
 pub fn usage(message: String) -> anyhow::Error {
     CliError::Usage(message).into()

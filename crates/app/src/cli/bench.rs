@@ -15,6 +15,7 @@ use bouncelight::render::{DrawnCount, Renderer, RendererOptions, cull::Count};
 use bouncelight_lab::study::{
     bench::{BenchOptions, Measurement, measure},
     count,
+    device::Device,
     layers::Layers,
     projection::{self, Cost, GTX_1050, GTX_1650, modelled},
 };
@@ -94,10 +95,8 @@ struct Record {
     version: String,
     scene: String,
     size: [u32; 2],
-    adapter: String,
-    backend: String,
-    driver: String,
-    software: bool,
+    #[serde(flatten)]
+    device: Device,
     /// How the network's numbers are stored.
     #[serde(default)]
     precision: Option<PrecisionName>,
@@ -184,10 +183,7 @@ pub fn run(global: &Global, args: Args) -> Result<()> {
         version: env!("CARGO_PKG_VERSION").into(),
         scene: args.scene.scene.clone(),
         size: args.scene.size,
-        adapter: gpu.info.name.clone(),
-        backend: format!("{:?}", gpu.info.backend).to_lowercase(),
-        driver: format!("{} {}", gpu.info.driver, gpu.info.driver_info),
-        software: gpu.is_software(),
+        device: Device::of(&gpu),
         precision: global.precision,
         frames: args.frames,
         warmup: args.warmup,
@@ -313,7 +309,8 @@ fn read_base(path: &PathBuf) -> Result<Record> {
 }
 
 fn compare(base: &Record, now: &Record, allowed: f64) -> Result<()> {
-    if (&base.adapter, &base.backend, base.size) != (&now.adapter, &now.backend, now.size) {
+    let on = |r: &Record| (r.device.adapter.clone(), r.device.backend.clone(), r.size);
+    if on(base) != on(now) {
         return Err(usage(
             "the base record is of another adapter, backend or size; measure a new one with --json".into(),
         ));

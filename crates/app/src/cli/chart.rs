@@ -287,7 +287,7 @@ fn provenance(before: Option<&Record>) -> Provenance {
     // What is kept was measured by the program of then.
     let commit = before.map(|b| b.provenance.commit.clone()).or(commit);
     Provenance {
-        command: format!("bouncelight {}", std::env::args().skip(1).collect::<Vec<_>>().join(" ")),
+        command: command_line(),
         version: env!("CARGO_PKG_VERSION").into(),
         commit: commit.unwrap_or_else(|| "unknown".into()),
         program: program.unwrap_or_else(|| "unknown".into()),

@@ -161,12 +161,11 @@ fn convert_file(args: &ConvertArgs) -> Result<()> {
     let bytes = Weights::read_bytes(&args.input)?;
     let name = |path: &Path| path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
     let mut provenance = Provenance::new();
-    let command: Vec<String> = std::env::args().skip(1).collect();
     let hash: String = Sha256::digest(&bytes).iter().map(|b| format!("{b:02x}")).collect();
     provenance.insert("converted_from".into(), name(&args.input).into());
     provenance.insert("sha256".into(), hash.into());
     provenance.insert("program".into(), format!("bouncelight {}", env!("CARGO_PKG_VERSION")).into());
-    provenance.insert("command".into(), format!("bouncelight {}", command.join(" ")).into());
+    provenance.insert("command".into(), command_line().into());
     let recipe = Recipe {
         arch: match args.arch {
             ArchName::Pix2pix => Arch::Pix2pix,

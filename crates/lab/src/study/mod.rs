@@ -4,6 +4,7 @@ pub mod bench;
 mod changes;
 pub mod chart;
 pub mod count;
+pub mod device;
 mod error;
 pub mod fit;
 pub mod fitted;

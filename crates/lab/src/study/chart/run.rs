@@ -1,7 +1,7 @@
 //! The work, piece by piece: what is done stays done, what fails loses nothing else.
 
 use super::{
-    ChartError, Device, Kind, Metric, Provenance, Record, SceneFacts, Unit,
+    ChartError, Kind, Metric, Provenance, Record, SceneFacts, Unit,
     entries::Entry,
     plan::Plan,
     published,
@@ -10,6 +10,7 @@ use super::{
 };
 use crate::reference;
 use crate::study::{
+    device::Device,
     hash, judge,
     session::{Session, SessionError, SessionOptions},
     truth,

@@ -6,7 +6,7 @@ use super::{
     sheet::Row,
     test_run::Stage,
 };
-use crate::study::session::SessionError;
+use crate::study::{device::Device, session::SessionError};
 use bouncelight::gpu::Gpu;
 use bouncelight_scene::image_io;
 use std::{path::PathBuf, time::Instant};
@@ -92,17 +92,8 @@ impl<'a> Suite<'a> {
             tests.push(finding);
             stage.forget();
         }
-        let info = &self.gpu.info;
-        Ok(Record {
-            schema: SCHEMA,
-            version: env!("CARGO_PKG_VERSION").into(),
-            adapter: info.name.clone(),
-            backend: format!("{:?}", info.backend).to_lowercase(),
-            driver: format!("{} {}", info.driver, info.driver_info).trim().into(),
-            software: self.gpu.is_software(),
-            subjects: self.subjects(),
-            tests,
-        })
+        let version = env!("CARGO_PKG_VERSION").into();
+        Ok(Record { schema: SCHEMA, version, device: Device::of(self.gpu), subjects: self.subjects(), tests })
     }
 
     fn subjects(&self) -> Vec<SubjectRecord> {
