@@ -104,7 +104,7 @@ pub struct Time {
 }
 
 /// One entry in one scene: a piece of the work.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Unit {
     /// Everything that decides the result; a piece with the same key is not done again.
     pub key: String,
