@@ -1,7 +1,7 @@
 //! `bouncelight chart`: speed against accuracy, as a table, a page and records.
 
 use super::{
-    args::{Global, MethodName, parse_size, real_time, usage},
+    args::{Global, MethodName, command_line, number, one_of, parse_size, real_time, usage},
     error::CliError,
     interrupt,
     progress::Progress,
@@ -52,8 +52,9 @@ pub struct Args {
     #[arg(long, default_value_t = 1024, value_name = "N", help_heading = WHAT)]
     paths: u32,
     /// Error on the vertical axis: light (of the light that is added), flip, or the paper's l1.
-    #[arg(long, value_enum, default_value = "light", help_heading = WHAT)]
-    metric: MetricName,
+    #[arg(long, value_parser = one_of(Metric::ALL.map(|m| (m.name(), m))), default_value = "light",
+        help_heading = WHAT)]
+    metric: Metric,
     /// Picture size, pixels; references from elsewhere keep theirs.
     #[arg(long, default_value = "1024x512", value_parser = parse_size, value_name = "WxH", help_heading = HOW)]
     size: [u32; 2],
@@ -105,14 +106,6 @@ Examples:
   bouncelight chart --out out/chart --scenes scene.glb --methods gather,neural --size 512x256
   bouncelight chart --out out/chart --gather cell_frames=32 --metric flip";
 
-/// What is up.
-#[derive(Debug, Clone, Copy, clap::ValueEnum)]
-enum MetricName {
-    Light,
-    Flip,
-    L1,
-}
-
 /// `None` for all.
 fn parse_method(text: &str) -> Result<Option<MethodName>, String> {
     match MethodName::from_name(text) {
@@ -127,19 +120,11 @@ fn parse_method(text: &str) -> Result<Option<MethodName>, String> {
 }
 
 fn parse_error(text: &str) -> Result<f64, String> {
-    let error: f64 = text.parse().map_err(|e| format!("{e}"))?;
-    if error.is_finite() && error > 0.0 { Ok(error) } else { Err("it must be above 0, such as 0.05".into()) }
-}
-
-impl Args {
-    /// It runs networks on a device.
-    pub fn runs_network(&self) -> bool {
-        true
-    }
+    number(text, |error: f64| error.is_finite() && error > 0.0, "it must be above 0, such as 0.05")
 }
 
 pub fn run(global: &Global, args: Args) -> Result<()> {
-    let metric = Metric::ALL[args.metric as usize];
+    let metric = args.metric;
     let words = if args.scenes.is_empty() { scenes::DEFAULT.map(String::from).to_vec() } else { args.scenes.clone() };
     let sources = sources(&words).map_err(|e| usage(e.to_string()))?;
     let mut entries = entries(global, &args)?;

@@ -1,7 +1,7 @@
 //! `bouncelight fit`: the cheapest method that is good enough for a scene, kept beside it.
 
 use super::{
-    args::{Global, usage},
+    args::{Global, number, usage},
     error::CliError,
     interrupt,
     progress::Progress,
@@ -85,8 +85,7 @@ enum Cost {
 }
 
 fn parse_budget(text: &str) -> Result<f64, String> {
-    let ms: f64 = text.parse().map_err(|e| format!("{e}"))?;
-    if ms.is_finite() && ms >= 0.0 { Ok(ms) } else { Err("a budget is 0 or more milliseconds".into()) }
+    number(text, |ms: f64| ms.is_finite() && ms >= 0.0, "a budget is 0 or more milliseconds")
 }
 
 fn learning_has_left(_: &str) -> Result<String, String> {

@@ -104,9 +104,8 @@ impl Command {
             Command::View(_) => true,
             Command::Render(a) => a.runs_network(),
             Command::Bench(a) => a.runs_network(),
-            Command::Apply(_) | Command::Demo(_) | Command::Fit(_) => true,
+            Command::Apply(_) | Command::Chart(_) | Command::Demo(_) | Command::Fit(_) => true,
             Command::Stability(a) => a.runs_network(),
-            Command::Chart(a) => a.runs_network(),
             Command::Weights(a) => a.runs_network(),
             Command::Compare(_) | Command::Dataset(_) | Command::Doctor(_) | Command::Export(_) | Command::Trace(_) => {
                 false
