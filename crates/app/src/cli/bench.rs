@@ -5,9 +5,10 @@ use super::stdout::say;
 use super::{
     args::{Global, MethodName, PrecisionName, real_time, replaced, usage},
     error::CliError,
+    record,
     scene_args::SceneArgs,
 };
-use anyhow::{Context, Result};
+use anyhow::Result;
 use bouncelight::gi::Method;
 use bouncelight::gpu::Gpu;
 use bouncelight::gpu_scene::SceneGpu;
@@ -116,7 +117,8 @@ impl Args {
 }
 
 pub fn run(global: &Global, args: Args) -> Result<()> {
-    let base = args.compare.as_ref().map(read_base).transpose()?;
+    let read = |path| record::read(path, "is not a record of `bench --json`", |r: &Record| r.schema);
+    let base = args.compare.as_deref().map(read).transpose()?;
     if let Some(path) = &args.json {
         bouncelight_scene::image_io::check_writable(path)?;
     }
@@ -195,10 +197,7 @@ pub fn run(global: &Global, args: Args) -> Result<()> {
         super::layers::print(layers);
     }
     if let Some(path) = &args.json {
-        bouncelight_scene::image_io::write_whole(
-            path,
-            format!("{}\n", serde_json::to_string_pretty(&record)?).as_bytes(),
-        )?;
+        record::write(path, &record)?;
     }
     match (base, args.fail_over) {
         (Some(base), Some(allowed)) => compare(&base, &record, allowed),
@@ -296,16 +295,6 @@ fn rows(m: &Measurement, layers: bool) -> Vec<(String, f64, f64)> {
         }
     }
     rows
-}
-
-fn read_base(path: &PathBuf) -> Result<Record> {
-    let text = std::fs::read_to_string(path).with_context(|| format!("cannot read {}", path.display()))?;
-    let base: Record =
-        serde_json::from_str(&text).with_context(|| format!("{} is not a record of `bench --json`", path.display()))?;
-    if base.schema != 1 {
-        return Err(usage(format!("{}: schema {} is not known", path.display(), base.schema)));
-    }
-    Ok(base)
 }
 
 fn compare(base: &Record, now: &Record, allowed: f64) -> Result<()> {

@@ -5,6 +5,7 @@ use super::{
     error::CliError,
     interrupt,
     progress::Progress,
+    record,
     stdout::say,
 };
 use anyhow::{Context, Result};
@@ -162,7 +163,7 @@ pub fn run(global: &Global, args: Args) -> Result<()> {
         },
         warn: &|text| eprintln!("warning: {text}"),
         go_on: &|| !interrupt::requested(),
-        save: &|record| Ok(image_io::write_whole(&place("chart.json"), json(record)?.as_bytes())?),
+        save: &|record| Ok(record::write(&place("chart.json"), record)?),
     };
     let record = run::run(&gpu, &plan, before, provenance, &hooks);
     progress.into_inner().finish();
@@ -233,23 +234,10 @@ fn entries(global: &Global, args: &Args) -> Result<Vec<Entry>> {
     Ok(entries)
 }
 
-fn json(record: &Record) -> Result<String, ChartError> {
-    Ok(format!("{}\n", serde_json::to_string_pretty(record)?))
-}
-
 /// The record of an earlier run; none where there is none.
 fn read(path: &Path) -> Result<Option<Record>> {
-    let text = match std::fs::read_to_string(path) {
-        Ok(text) => text,
-        Err(e) if e.kind() == std::io::ErrorKind::NotFound => return Ok(None),
-        Err(e) => return Err(e).with_context(|| format!("cannot read {}", path.display())),
-    };
     let words = "is not a record of `chart`; move it away, or name another --out";
-    let record: Record = serde_json::from_str(&text).with_context(|| format!("{} {words}", path.display()))?;
-    if record.schema != 1 {
-        return Err(usage(format!("{}: schema {} is not known", path.display(), record.schema)));
-    }
-    Ok(Some(record))
+    path.exists().then(|| record::read(path, words, |r: &Record| r.schema)).transpose()
 }
 
 /// Where this run comes from; `before` is a run whose results are kept, whoever made them.
@@ -294,7 +282,7 @@ fn today() -> String {
 
 fn write(args: &Args, record: &Record, metric: Metric) -> Result<()> {
     let place = |name: &str| args.out.join(name);
-    image_io::write_whole(&place("chart.json"), json(record)?.as_bytes())?;
+    record::write(&place("chart.json"), record)?;
     image_io::write_whole(&place("chart.csv"), report::csv(record).as_bytes())?;
     let page = args.page.clone().unwrap_or_else(|| place("results.md"));
     let picture = relative(&page, &place("chart.svg"));

@@ -5,6 +5,7 @@ use super::{
     error::CliError,
     interrupt,
     progress::Progress,
+    record,
     scene_args::SceneArgs,
     stdout::say,
 };
@@ -214,6 +215,5 @@ fn report(folder: &Path, heading: &str, found: &Fit, options: &FitOptions, fitte
         }
     }
     image_io::write_whole(&folder.join("fit.md"), page.as_bytes())?;
-    let record = serde_json::to_string_pretty(&found.record(options, fitted.clone()))?;
-    Ok(image_io::write_whole(&folder.join("fit.json"), format!("{record}\n").as_bytes())?)
+    Ok(record::write(&folder.join("fit.json"), &found.record(options, fitted.clone()))?)
 }

@@ -20,6 +20,7 @@ mod layers;
 mod log;
 mod picture;
 mod progress;
+mod record;
 mod render;
 mod scene_args;
 mod sequence;

@@ -222,10 +222,9 @@ fn tell(finding: &Finding) {
 }
 
 fn write(args: &Args, record: &Record) -> Result<()> {
-    let text = format!("{}\n", serde_json::to_string_pretty(record)?);
     let beside = args.out.as_ref().map(|out| out.join("stability.json"));
     for path in args.json.iter().chain(&beside) {
-        image_io::write_whole(path, text.as_bytes())?;
+        super::record::write(path, record)?;
     }
     if let Some(path) = &args.limits {
         image_io::write_whole(path, stability::page(record, &command_line()).as_bytes())?;

@@ -263,9 +263,6 @@ pub enum ChartError {
     /// Reading back failed.
     #[error(transparent)]
     Readback(#[from] bouncelight::gpu::readback::ReadbackError),
-    /// The record cannot be turned into text.
-    #[error("the record cannot be written: {0}")]
-    Json(#[from] serde_json::Error),
     /// The driver refused a command.
     #[error("the GPU driver refused a command: {0}")]
     Driver(String),
