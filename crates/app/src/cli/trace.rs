@@ -174,22 +174,19 @@ impl Task {
             // No watchdog there, and other programs may want the cores, too.
             options.dispatch *= 4;
         }
-        let mut tracer =
-            Tracer::new(&gpu.device, &gpu.queue, &kernel, &packed, subject, options).map_err(|e| match e {
-                TracerError::Points { .. } | TracerError::Option(_) => usage(e.to_string()),
-                e => e.into(),
-            })?;
+        let tracer = Tracer::new(&gpu.device, &gpu.queue, &kernel, &packed, subject, options).map_err(|e| match e {
+            TracerError::Points { .. } | TracerError::Option(_) => usage(e.to_string()),
+            e => e.into(),
+        })?;
         let mut progress = Progress::new(global, "samples", tracer.expected_samples());
-        while tracer.step()? {
-            let expected = tracer.expected_samples();
-            progress.at(tracer.progress() * expected as f64, expected);
-            if interrupt::requested() {
-                return Err(CliError::Interrupted.into());
-            }
-        }
+        let traced = tracer.run(|t| {
+            let expected = t.expected_samples();
+            progress.at(t.progress() * expected as f64, expected);
+            !interrupt::requested()
+        })?;
         progress.finish();
         interrupt::check()?;
-        let mut traced = tracer.finish()?;
+        let mut traced = traced.ok_or(CliError::Interrupted)?;
         if !global.quiet {
             eprintln!("{}", sentence(&traced));
         }

@@ -370,14 +370,9 @@ fn trace(gpu: &Gpu, shot: &Shot, progress: &Progress) -> Result<Pictures, String
     let subject = Subject { camera: &shot.camera, size: shot.size, points: None };
     let layers = if shot.is_exr() { Traced::ALL.to_vec() } else { vec![Traced::Combined] };
     let options = TracerOptions { samples: shot.samples, layers, ..Default::default() };
-    let mut tracer =
-        Tracer::new(&gpu.device, &gpu.queue, &kernel, &packed, subject, options).map_err(|e| e.to_string())?;
-    while tracer.step().map_err(|e| e.to_string())? {
-        if !progress.at(tracer.progress()) {
-            return Ok(None);
-        }
-    }
-    let mut traced = tracer.finish().map_err(|e| e.to_string())?;
+    let tracer = Tracer::new(&gpu.device, &gpu.queue, &kernel, &packed, subject, options);
+    let traced = tracer.and_then(|t| t.run(|t| progress.at(t.progress()))).map_err(|e| e.to_string())?;
+    let Some(mut traced) = traced else { return Ok(None) };
     let (_, beauty) = traced.layers.remove(0);
     let layer = |(l, data): &(Traced, Vec<f32>)| image_io::Layer::new(l.name(), l.channels(), data);
     Ok(Some((beauty, traced.layers.iter().map(layer).collect())))
