@@ -160,7 +160,7 @@ pub fn run(global: &Global, args: Args) -> Result<()> {
     let with = |method: &Method| RendererOptions { method: method.clone(), ..Default::default() };
     let make = |method| Renderer::new(&gpu.device, &gpu.queue, args.scene.size, with(method));
     let mut renderers = methods.iter().map(make).collect::<Result<Vec<_>, _>>()?;
-    let turn = |renderer| measure(&gpu, renderer, &uploaded, &camera, options);
+    let turn = |renderer| measure(&gpu, renderer, &uploaded, &camera, options, false);
     let mut measured = renderers.iter_mut().map(turn).collect::<Result<Vec<Measurement>, _>>()?;
     if args.count {
         for (method, measured) in methods.iter().zip(&mut measured) {

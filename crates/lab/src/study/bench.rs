@@ -141,36 +141,12 @@ pub enum BenchError {
 }
 
 /// Draws `options.warmup + options.frames` frames of the same view, waiting for each, and measures
-/// the latter.
+/// the latter. `cuts`: each frame is the first after a cut, on which methods with a history may spend
+/// more.
 ///
 /// # Errors
 /// [`BenchError`].
 pub fn measure(
-    gpu: &Gpu,
-    renderer: &mut Renderer,
-    scene: &SceneGpu,
-    camera: &Camera,
-    options: BenchOptions,
-) -> Result<Measurement, BenchError> {
-    measure_frames(gpu, renderer, scene, camera, options, false)
-}
-
-/// As [`measure`], but each frame is the first after a cut, on which methods with a history may
-/// spend more.
-///
-/// # Errors
-/// [`BenchError`].
-pub fn measure_cuts(
-    gpu: &Gpu,
-    renderer: &mut Renderer,
-    scene: &SceneGpu,
-    camera: &Camera,
-    options: BenchOptions,
-) -> Result<Measurement, BenchError> {
-    measure_frames(gpu, renderer, scene, camera, options, true)
-}
-
-fn measure_frames(
     gpu: &Gpu,
     renderer: &mut Renderer,
     scene: &SceneGpu,

@@ -37,16 +37,16 @@ impl Stage<'_> {
                 let mut cold = (None, None);
                 if method.has_history() && shot.fallback.is_none() {
                     let first = self.session.picture(method, &self.camera, Settling::COLD)?;
-                    let measured = self.session.measure_cuts(method, &self.camera, plan.bench)?;
+                    let measured = self.session.measure(method, &self.camera, plan.bench, true)?;
                     cold = (Some(self.judged(&first)?), Some(time(&measured)));
                 }
-                let measured = self.session.measure(method, &self.camera, plan.bench)?;
+                let measured = self.session.measure(method, &self.camera, plan.bench, false)?;
                 let costs =
                     if shot.fallback.is_none() { self.session.count(method, &self.camera)? } else { Vec::new() };
                 Ok(Unit {
                     scores: Some(self.judged(&shot)?),
                     cold: cold.0,
-                    time: time(&measured),
+                    time: Some(time(&measured)),
                     cold_time: cold.1,
                     costs,
                     bytes: measured.total_bytes(),
@@ -59,8 +59,11 @@ impl Stage<'_> {
                 let settling = Settling { frames: 1, samples: plan.samples };
                 let shot = self.session.picture(&direct, &self.camera, settling)?;
                 let sky = self.session.scene().environment.radiance;
-                let (shown, network) = on_pictures::picture(gpu, weights, &shot, sky)?;
-                let raster = self.session.measure(&direct, &self.camera, plan.bench)?;
+                let network = published::network(gpu, weights, self.session.size())?;
+                let shown = on_pictures::picture::<super::ChartError>(gpu, (weights, &network), &shot, sky)?;
+                // A saved picture has 8 bits.
+                let shown: Vec<f32> = shown.into_iter().map(|v| (v * 255.0).round() / 255.0).collect();
+                let raster = self.session.measure(&direct, &self.camera, plan.bench, false)?;
                 let (frame, own) = (raster.wall_ms, published::time(gpu, &network, plan.bench)?);
                 let wall_ms = Spread { median: frame.median + own.median, p95: frame.p95 + own.p95 };
                 let seen = judge::compare_shown(&shown, &self.reference, true)?;

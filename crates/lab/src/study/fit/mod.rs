@@ -352,7 +352,7 @@ impl Search<'_, '_> {
         let camera = self.views[0].camera.clone();
         if self.options.timed {
             let options = super::bench::BenchOptions { frames: 40, warmup: 20 };
-            let measured = self.session.measure(&method, &camera, options)?;
+            let measured = self.session.measure(&method, &camera, options, false)?;
             if measured.method != method.name() {
                 return Ok(None);
             }
@@ -361,7 +361,7 @@ impl Search<'_, '_> {
             }
             // Without timestamps that can be believed: the clock, less that of the rasteriser
             // alone.
-            let bare = self.session.measure(&bouncelight::gi::Method::Direct, &camera, options)?;
+            let bare = self.session.measure(&bouncelight::gi::Method::Direct, &camera, options, false)?;
             return Ok(Some((measured.wall_ms.median - bare.wall_ms.median).max(0.0)));
         }
         match self.session.count(&method, &camera) {

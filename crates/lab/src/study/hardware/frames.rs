@@ -130,14 +130,14 @@ fn one(
     let options = RendererOptions { method, ..Default::default() };
     let mut renderer = Renderer::new(&gpu.device, &gpu.queue, size, options)?;
     // Drivers compile at a shader's first use.
-    let pilot = measure(gpu, &mut renderer, uploaded, camera, BenchOptions { frames: 1, warmup: 1 })?;
+    let pilot = measure(gpu, &mut renderer, uploaded, camera, BenchOptions { frames: 1, warmup: 1 }, false)?;
     let affordable = seconds / (pilot.wall_ms.median * 1e-3).max(1e-6);
     let within = |share: f64, least: u32, most: u32| ((affordable * share) as u32).clamp(least, most);
     let options = BenchOptions {
         frames: within(0.65, LEAST.frames, MOST.frames),
         warmup: within(0.35, LEAST.warmup, MOST.warmup),
     };
-    Ok((measure(gpu, &mut renderer, uploaded, camera, options)?, options.frames))
+    Ok((measure(gpu, &mut renderer, uploaded, camera, options, false)?, options.frames))
 }
 
 /// Milliseconds of the passes that find and add indirect light.
