@@ -201,7 +201,7 @@ mod unit {
 
     fn found(subject: &str, values: Vec<f64>, test: &Test) -> Found {
         let pass = Some(passes(test, &values));
-        Found { subject: subject.into(), values, pass, seconds: 1.0, reason: None, fallback: None, why: None }
+        Found { subject: subject.into(), values, pass, seconds: 1.0, ..Found::default() }
     }
 
     #[test]
