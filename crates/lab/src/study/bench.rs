@@ -25,7 +25,7 @@ pub struct BenchOptions {
 }
 
 /// Median and 95th percentile over the counted frames, milliseconds.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 pub struct Spread {
     /// Median.
     pub median: f64,
@@ -44,7 +44,7 @@ pub struct PassTime {
 }
 
 /// What one method costs on one device.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Measurement {
     /// GI method.
     pub method: String,
@@ -188,9 +188,6 @@ pub fn measure(
         passes: per_pass(&frames),
         gpu_ms: (!sums.is_empty()).then(|| spread(sums)),
         wall_ms: spread(wall),
-        costs: Vec::new(),
-        modelled: BTreeMap::new(),
-        modelled_at_rest: BTreeMap::new(),
         drawn: renderer.drawn(),
         bytes: renderer
             .bytes()
@@ -198,6 +195,7 @@ pub fn measure(
             .chain([("scene", scene.bytes())])
             .map(|(n, b)| (n.to_string(), b))
             .collect(),
+        ..Measurement::default()
     })
 }
 

@@ -173,11 +173,7 @@ mod tests {
             passes: vec![pass("render.gbuffer", 3.0), pass("gi.ambient", 1.0), pass("gi.ssr", 0.5)],
             gpu_ms: Some(at(4.5)),
             wall_ms: at(4.6),
-            bytes: Vec::new(),
-            costs: Vec::new(),
-            modelled: Default::default(),
-            modelled_at_rest: Default::default(),
-            drawn: Default::default(),
+            ..Measurement::default()
         };
         assert_eq!(own(&m, 3.0), (1.5, Timing::Timestamps));
         // A frame is waited for, too.
