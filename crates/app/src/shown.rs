@@ -1,6 +1,17 @@
-//! Radiance as bytes of a PNG.
+//! Radiance as bytes of a PNG, and what a picture's file tells of how it was made.
 
+use bouncelight::gpu::Gpu;
 use bouncelight::render::tonemap_curve::Tonemap;
+use bouncelight_lab::study::device::Device;
+use bouncelight_scene::image_io::Metadata;
+
+/// Program, device, and the command that draws the same.
+pub(crate) fn metadata(gpu: &Gpu, command: String) -> Metadata {
+    let Device { adapter, backend, driver, .. } = Device::of(gpu);
+    let software = format!("bouncelight {}", env!("CARGO_PKG_VERSION"));
+    let facts = [software, command, adapter, backend, driver];
+    ["Software", "Command", "Adapter", "Backend", "Driver"].map(String::from).into_iter().zip(facts).collect()
+}
 
 /// 8-bit sRGB of linear RGB, `ev` stops brighter, through the view transform.
 pub(crate) fn rgb(linear: &[f32], ev: f32, tonemap: Tonemap) -> Vec<u8> {

@@ -1,9 +1,9 @@
 //! `bouncelight apply`: a network on G-buffer pictures from elsewhere.
 
-use super::args::{Global, PrecisionName, usage};
+use super::args::{Global, PrecisionName, command_line, usage};
 use super::progress::Progress;
 use anyhow::Result;
-use bouncelight::gpu::{readback, timing::Recorder};
+use bouncelight::gpu::timing::Recorder;
 use bouncelight::net::{
     format::Weights,
     gpu::{NetError, Network, Options, Setup},
@@ -94,10 +94,9 @@ pub fn run(global: &Global, args: Args) -> Result<()> {
     let output = network(global, &weights, &input, &args)?;
     let shown = pictures::picture(&output);
     let bytes: Vec<u8> = shown.iter().map(|v| (v * 255.0).round() as u8).collect();
-    let command: Vec<String> = std::env::args().skip(1).collect();
     let metadata = [
         ("Software", format!("bouncelight {}", env!("CARGO_PKG_VERSION"))),
-        ("Command", format!("bouncelight {}", command.join(" "))),
+        ("Command", command_line()),
         ("Weights", weights.hash_text()),
     ];
     let metadata: image_io::Metadata = metadata.map(|(k, v)| (k.to_string(), v)).into();
@@ -135,8 +134,7 @@ fn network(global: &Global, weights: &Weights, input: &Tensor, args: &Args) -> R
         Err(e @ (NetError::Plan(PlanError::TooLarge { .. }) | NetError::Limit { .. })) => return slow(&e),
         Err(e) => return Err(e.into()),
     };
-    let place = network.input();
-    gpu.queue.write_buffer(place.buffer, place.offset, bytemuck::cast_slice(&input.to_padded()));
+    pictures::upload(&gpu, &network, input);
     let plan = network.plan();
     if !global.quiet {
         let (gflop, mb) = (plan.flops() as f64 / 1e9, network.bytes() as f64 / 1e6);
@@ -153,10 +151,7 @@ fn network(global: &Global, weights: &Weights, input: &Tensor, args: &Args) -> R
         progress.step();
     }
     progress.finish();
-    let place = network.output();
-    let bytes = readback::buffer(&gpu.device, &gpu.queue, place.buffer, place.offset, place.size)?;
-    let shape = network.plan().tensors[network.plan().output].shape;
-    Ok(Tensor::from_padded(shape, &bytemuck::pod_collect_to_vec::<u8, f32>(&bytes)))
+    Ok(pictures::download(&gpu, &network)?)
 }
 
 /// A picture of 8 bits without transparency; an alpha channel that is 1 everywhere is left out.

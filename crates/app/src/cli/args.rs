@@ -13,7 +13,7 @@ use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap::error::ErrorKind;
 use clap::{Arg, Args, Command, ValueEnum};
 use serde::{Deserialize, Serialize};
-use std::{ffi::OsStr, path::PathBuf};
+use std::{ffi::OsStr, fmt::Display, path::PathBuf, str::FromStr};
 
 /// Flags every subcommand takes.
 #[derive(Debug, Args)]
@@ -23,20 +23,22 @@ pub struct Global {
     #[arg(long, global = true, value_name = "NAME")]
     pub adapter: Option<String>,
     /// Graphics API.
-    #[arg(long, global = true, value_enum, default_value = "auto", value_name = "API")]
-    pub backend: BackendName,
+    #[arg(long, global = true, value_parser = one_of(BACKENDS), default_value = "auto", value_name = "API")]
+    pub backend: Backend,
     /// Storage of a network's numbers [default: f16 for filters of light, else f32].
     #[arg(long, global = true, value_enum, value_name = "BITS")]
     pub precision: Option<PrecisionName>,
     /// Texture memory: full (4 B a texel), compressed (BC7, 1 B), auto (BC7 above 512 MiB).
-    #[arg(long, global = true, value_enum, default_value = "auto", value_name = "HOW", hide_possible_values = true)]
-    pub textures: TexturesName,
+    #[arg(long, global = true, value_parser = one_of(TEXTURES), default_value = "auto", value_name = "HOW",
+        hide_possible_values = true)]
+    pub textures: TextureMemory,
     /// Metres in a unit of the scene file, 1e-9 to 1e9; 0.001 for millimetres.
     #[arg(long, global = true, default_value_t = 1.0, allow_hyphen_values = true, value_parser = parse_scale, value_name = "M")]
     pub scale: f32,
     /// Up axis of the scene file.
-    #[arg(long, global = true, value_enum, default_value = "y", value_name = "AXIS")]
-    pub up: UpName,
+    #[arg(long, global = true, value_parser = one_of([("y", Up::Y), ("z", Up::Z)]), default_value = "y",
+        value_name = "AXIS")]
+    pub up: Up,
     /// Refuse a faulty glTF file instead of repairing it with a warning.
     #[arg(long, global = true)]
     pub strict: bool,
@@ -63,15 +65,22 @@ pub struct Global {
     _version: Option<bool>,
 }
 
-/// Names of the graphics APIs.
-#[derive(Debug, Clone, Copy, ValueEnum)]
-#[allow(missing_docs, reason = "the variants are their own words on the command line")]
-pub enum BackendName {
-    Auto,
-    Vulkan,
-    Gl,
-    Metal,
-    Dx12,
+const BACKENDS: [(&str, Backend); 5] = [
+    ("auto", Backend::Auto),
+    ("vulkan", Backend::Vulkan),
+    ("gl", Backend::Gl),
+    ("metal", Backend::Metal),
+    ("dx12", Backend::Dx12),
+];
+const TEXTURES: [(&str, TextureMemory); 3] =
+    [("auto", TextureMemory::Auto), ("full", TextureMemory::Full), ("compressed", TextureMemory::Compressed)];
+
+/// Parses a choice by its name; the help lists the names.
+pub fn one_of<T: Copy + Send + Sync + 'static, const N: usize>(
+    choices: [(&'static str, T); N],
+) -> impl TypedValueParser<Value = T> {
+    let value = move |name: String| choices.iter().find(|(n, _)| *n == name).expect("one of these names").1;
+    PossibleValuesParser::new(choices.map(|(name, _)| name)).map(value)
 }
 
 /// How a network's numbers are stored.
@@ -95,25 +104,6 @@ impl PrecisionName {
     }
 }
 
-/// How textures lie in the device's memory.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum)]
-#[allow(missing_docs, reason = "the variants are their own words on the command line")]
-pub enum TexturesName {
-    #[default]
-    Auto,
-    Full,
-    Compressed,
-}
-
-/// Axes that may point up.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum)]
-#[allow(missing_docs, reason = "the variants are their own words on the command line")]
-pub enum UpName {
-    #[default]
-    Y,
-    Z,
-}
-
 /// How progress is shown.
 #[derive(Debug, Clone, Copy, PartialEq, ValueEnum)]
 #[allow(missing_docs, reason = "the variants are their own words on the command line")]
@@ -133,29 +123,13 @@ impl Global {
 
     /// What a scene file may do.
     pub fn load_options(&self) -> LoadOptions {
-        let up = if self.up == UpName::Y { Up::Y } else { Up::Z };
-        LoadOptions { allow_outside: self.allow_outside, strict: self.strict, units: Units { scale: self.scale, up } }
-    }
-
-    /// How textures are uploaded.
-    pub fn textures(&self) -> TextureMemory {
-        match self.textures {
-            TexturesName::Auto => TextureMemory::Auto,
-            TexturesName::Full => TextureMemory::Full,
-            TexturesName::Compressed => TextureMemory::Compressed,
-        }
+        let units = Units { scale: self.scale, up: self.up };
+        LoadOptions { allow_outside: self.allow_outside, strict: self.strict, units }
     }
 
     /// What is asked of the device.
     pub fn gpu_options(&self) -> GpuOptions {
-        let backend = match self.backend {
-            BackendName::Auto => Backend::Auto,
-            BackendName::Vulkan => Backend::Vulkan,
-            BackendName::Gl => Backend::Gl,
-            BackendName::Metal => Backend::Metal,
-            BackendName::Dx12 => Backend::Dx12,
-        };
-        GpuOptions { backend, adapter: self.adapter.clone() }
+        GpuOptions { backend: self.backend, adapter: self.adapter.clone() }
     }
 
     /// Opens the device and says on standard error which one it is.
@@ -233,9 +207,20 @@ pub fn load_weights(path: Option<&PathBuf>) -> Result<Weights> {
     Ok(Weights::find(path.map(PathBuf::as_path))?)
 }
 
+/// What was typed.
+pub fn command_line() -> String {
+    format!("bouncelight {}", std::env::args().skip(1).collect::<Vec<_>>().join(" "))
+}
+
 /// A usage error (exit code 2).
 pub fn usage(message: String) -> anyhow::Error {
     CliError::Usage(message).into()
+}
+
+/// Parses a number that `fits`; `otherwise` says which do.
+pub fn number<T: Copy + FromStr<Err: Display>>(text: &str, fits: fn(T) -> bool, otherwise: &str) -> Result<T, String> {
+    let number = text.parse().map_err(|e| format!("{e}"))?;
+    if fits(number) { Ok(number) } else { Err(otherwise.into()) }
 }
 
 pub fn parse_size(text: &str) -> Result<[u32; 2], String> {
@@ -248,6 +233,5 @@ pub fn parse_size(text: &str) -> Result<[u32; 2], String> {
 }
 
 fn parse_scale(text: &str) -> Result<f32, String> {
-    let scale: f32 = text.parse().map_err(|e| format!("{e}"))?;
-    if (1e-9..=1e9).contains(&scale) { Ok(scale) } else { Err("a scale is between 1e-9 and 1e9".into()) }
+    number(text, |scale: f32| (1e-9..=1e9).contains(&scale), "a scale is between 1e-9 and 1e9")
 }

@@ -5,9 +5,10 @@ use super::stdout::say;
 use super::{
     args::{Global, MethodName, PrecisionName, real_time, replaced, usage},
     error::CliError,
+    record,
     scene_args::SceneArgs,
 };
-use anyhow::{Context, Result};
+use anyhow::Result;
 use bouncelight::gi::{Method, gather::REST_PERIOD};
 use bouncelight::gpu::Gpu;
 use bouncelight::gpu_scene::SceneGpu;
@@ -15,6 +16,7 @@ use bouncelight::render::{DrawnCount, Renderer, RendererOptions, cull::Count};
 use bouncelight_lab::study::{
     bench::{BenchOptions, Measurement, measure},
     count,
+    device::Device,
     layers::Layers,
     projection::{self, Cost, GTX_1050, GTX_1650, modelled},
 };
@@ -94,10 +96,8 @@ struct Record {
     version: String,
     scene: String,
     size: [u32; 2],
-    adapter: String,
-    backend: String,
-    driver: String,
-    software: bool,
+    #[serde(flatten)]
+    device: Device,
     /// How the network's numbers are stored.
     #[serde(default)]
     precision: Option<PrecisionName>,
@@ -117,7 +117,8 @@ impl Args {
 }
 
 pub fn run(global: &Global, args: Args) -> Result<()> {
-    let base = args.compare.as_ref().map(read_base).transpose()?;
+    let read = |path| record::read(path, "is not a record of `bench --json`", |r: &Record| r.schema);
+    let base = args.compare.as_deref().map(read).transpose()?;
     if let Some(path) = &args.json {
         bouncelight_scene::image_io::check_writable(path)?;
     }
@@ -160,7 +161,7 @@ pub fn run(global: &Global, args: Args) -> Result<()> {
     let make =
         |method: &Method| Renderer::new(&gpu.device, &gpu.queue, args.scene.size, with(&method.clone().without_rest()));
     let mut renderers = methods.iter().map(make).collect::<Result<Vec<_>, _>>()?;
-    let turn = |renderer| measure(&gpu, renderer, &uploaded, &camera, options);
+    let turn = |renderer| measure(&gpu, renderer, &uploaded, &camera, options, false);
     let mut measured = renderers.iter_mut().map(turn).collect::<Result<Vec<Measurement>, _>>()?;
     if args.count {
         for (method, measured) in methods.iter().zip(&mut measured) {
@@ -188,10 +189,7 @@ pub fn run(global: &Global, args: Args) -> Result<()> {
         version: env!("CARGO_PKG_VERSION").into(),
         scene: args.scene.scene.clone(),
         size: args.scene.size,
-        adapter: gpu.info.name.clone(),
-        backend: format!("{:?}", gpu.info.backend).to_lowercase(),
-        driver: format!("{} {}", gpu.info.driver, gpu.info.driver_info),
-        software: gpu.is_software(),
+        device: Device::of(&gpu),
         precision: global.precision,
         frames: args.frames,
         warmup: args.warmup,
@@ -203,10 +201,7 @@ pub fn run(global: &Global, args: Args) -> Result<()> {
         super::layers::print(layers);
     }
     if let Some(path) = &args.json {
-        bouncelight_scene::image_io::write_whole(
-            path,
-            format!("{}\n", serde_json::to_string_pretty(&record)?).as_bytes(),
-        )?;
+        record::write(path, &record)?;
     }
     match (base, args.fail_over) {
         (Some(base), Some(allowed)) => compare(&base, &record, allowed),
@@ -306,18 +301,9 @@ fn rows(m: &Measurement, layers: bool) -> Vec<(String, f64, f64)> {
     rows
 }
 
-fn read_base(path: &PathBuf) -> Result<Record> {
-    let text = std::fs::read_to_string(path).with_context(|| format!("cannot read {}", path.display()))?;
-    let base: Record =
-        serde_json::from_str(&text).with_context(|| format!("{} is not a record of `bench --json`", path.display()))?;
-    if base.schema != 1 {
-        return Err(usage(format!("{}: schema {} is not known", path.display(), base.schema)));
-    }
-    Ok(base)
-}
-
 fn compare(base: &Record, now: &Record, allowed: f64) -> Result<()> {
-    if (&base.adapter, &base.backend, base.size) != (&now.adapter, &now.backend, now.size) {
+    let on = |r: &Record| (r.device.adapter.clone(), r.device.backend.clone(), r.size);
+    if on(base) != on(now) {
         return Err(usage(
             "the base record is of another adapter, backend or size; measure a new one with --json".into(),
         ));

@@ -1,10 +1,11 @@
 //! `bouncelight chart`: speed against accuracy, as a table, a page and records.
 
 use super::{
-    args::{Global, MethodName, parse_size, real_time, usage},
+    args::{Global, MethodName, command_line, number, one_of, parse_size, real_time, usage},
     error::CliError,
     interrupt,
     progress::Progress,
+    record,
     stdout::say,
 };
 use anyhow::{Context, Result};
@@ -52,8 +53,9 @@ pub struct Args {
     #[arg(long, default_value_t = 1024, value_name = "N", help_heading = WHAT)]
     paths: u32,
     /// Error on the vertical axis: light (of the light that is added), flip, or the paper's l1.
-    #[arg(long, value_enum, default_value = "light", help_heading = WHAT)]
-    metric: MetricName,
+    #[arg(long, value_parser = one_of(Metric::ALL.map(|m| (m.name(), m))), default_value = "light",
+        help_heading = WHAT)]
+    metric: Metric,
     /// Picture size, pixels; references from elsewhere keep theirs.
     #[arg(long, default_value = "1024x512", value_parser = parse_size, value_name = "WxH", help_heading = HOW)]
     size: [u32; 2],
@@ -105,14 +107,6 @@ Examples:
   bouncelight chart --out out/chart --scenes scene.glb --methods gather,neural --size 512x256
   bouncelight chart --out out/chart --gather cell_frames=32 --metric flip";
 
-/// What is up.
-#[derive(Debug, Clone, Copy, clap::ValueEnum)]
-enum MetricName {
-    Light,
-    Flip,
-    L1,
-}
-
 /// `None` for all.
 fn parse_method(text: &str) -> Result<Option<MethodName>, String> {
     match MethodName::from_name(text) {
@@ -127,19 +121,11 @@ fn parse_method(text: &str) -> Result<Option<MethodName>, String> {
 }
 
 fn parse_error(text: &str) -> Result<f64, String> {
-    let error: f64 = text.parse().map_err(|e| format!("{e}"))?;
-    if error.is_finite() && error > 0.0 { Ok(error) } else { Err("it must be above 0, such as 0.05".into()) }
-}
-
-impl Args {
-    /// It runs networks on a device.
-    pub fn runs_network(&self) -> bool {
-        true
-    }
+    number(text, |error: f64| error.is_finite() && error > 0.0, "it must be above 0, such as 0.05")
 }
 
 pub fn run(global: &Global, args: Args) -> Result<()> {
-    let metric = Metric::ALL[args.metric as usize];
+    let metric = args.metric;
     let words = if args.scenes.is_empty() { scenes::DEFAULT.map(String::from).to_vec() } else { args.scenes.clone() };
     let sources = sources(&words).map_err(|e| usage(e.to_string()))?;
     let mut entries = entries(global, &args)?;
@@ -177,7 +163,7 @@ pub fn run(global: &Global, args: Args) -> Result<()> {
         },
         warn: &|text| eprintln!("warning: {text}"),
         go_on: &|| !interrupt::requested(),
-        save: &|record| Ok(image_io::write_whole(&place("chart.json"), json(record)?.as_bytes())?),
+        save: &|record| Ok(record::write(&place("chart.json"), record)?),
     };
     let record = run::run(&gpu, &plan, before, provenance, &hooks);
     progress.into_inner().finish();
@@ -248,23 +234,10 @@ fn entries(global: &Global, args: &Args) -> Result<Vec<Entry>> {
     Ok(entries)
 }
 
-fn json(record: &Record) -> Result<String, ChartError> {
-    Ok(format!("{}\n", serde_json::to_string_pretty(record)?))
-}
-
 /// The record of an earlier run; none where there is none.
 fn read(path: &Path) -> Result<Option<Record>> {
-    let text = match std::fs::read_to_string(path) {
-        Ok(text) => text,
-        Err(e) if e.kind() == std::io::ErrorKind::NotFound => return Ok(None),
-        Err(e) => return Err(e).with_context(|| format!("cannot read {}", path.display())),
-    };
     let words = "is not a record of `chart`; move it away, or name another --out";
-    let record: Record = serde_json::from_str(&text).with_context(|| format!("{} {words}", path.display()))?;
-    if record.schema != 1 {
-        return Err(usage(format!("{}: schema {} is not known", path.display(), record.schema)));
-    }
-    Ok(Some(record))
+    path.exists().then(|| record::read(path, words, |r: &Record| r.schema)).transpose()
 }
 
 /// Where this run comes from; `before` is a run whose results are kept, whoever made them.
@@ -287,7 +260,7 @@ fn provenance(before: Option<&Record>) -> Provenance {
     // What is kept was measured by the program of then.
     let commit = before.map(|b| b.provenance.commit.clone()).or(commit);
     Provenance {
-        command: format!("bouncelight {}", std::env::args().skip(1).collect::<Vec<_>>().join(" ")),
+        command: command_line(),
         version: env!("CARGO_PKG_VERSION").into(),
         commit: commit.unwrap_or_else(|| "unknown".into()),
         program: program.unwrap_or_else(|| "unknown".into()),
@@ -309,7 +282,7 @@ fn today() -> String {
 
 fn write(args: &Args, record: &Record, metric: Metric) -> Result<()> {
     let place = |name: &str| args.out.join(name);
-    image_io::write_whole(&place("chart.json"), json(record)?.as_bytes())?;
+    record::write(&place("chart.json"), record)?;
     image_io::write_whole(&place("chart.csv"), report::csv(record).as_bytes())?;
     let page = args.page.clone().unwrap_or_else(|| place("results.md"));
     let picture = relative(&page, &place("chart.svg"));

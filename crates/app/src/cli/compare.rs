@@ -141,7 +141,7 @@ fn compare_pictures(args: &Args) -> Result<()> {
 /// The record into its file, the rows on standard output.
 fn report(args: &Args, record: &impl Serialize, rows: &[(&str, f64)]) -> Result<()> {
     if let Some(path) = &args.json {
-        image_io::write_whole(path, format!("{}\n", serde_json::to_string_pretty(record)?).as_bytes())?;
+        super::record::write(path, record)?;
     }
     if args.json.as_deref() != Some(Path::new("-")) {
         rows.iter().for_each(|(name, value)| say!("{name:<12}{value:.6}"));

@@ -119,7 +119,7 @@ fn times(gpu: &Gpu, uploaded: &SceneGpu, scene: &scene::Scene, methods: [Method;
     for method in methods {
         let options = RendererOptions { method, ..Default::default() };
         let mut renderer = Renderer::new(&gpu.device, &gpu.queue, TIMED_SIZE, options)?;
-        let m = measure(gpu, &mut renderer, uploaded, &scene.cameras[0], TIMED)?;
+        let m = measure(gpu, &mut renderer, uploaded, &scene.cameras[0], TIMED, false)?;
         interrupt::check()?;
         let gpu_ms = m.gpu_ms.map_or("no timestamps".into(), |t| format!("{:.2} ms GPU", t.median));
         let mib = m.total_bytes() as f64 / (1 << 20) as f64;

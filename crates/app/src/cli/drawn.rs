@@ -1,6 +1,6 @@
 //! A picture that was rasterised or traced, on its way into a file.
 
-use super::args::usage;
+use super::args::{command_line, usage};
 use crate::shown;
 use anyhow::Result;
 use bouncelight::gpu::Gpu;
@@ -60,7 +60,8 @@ impl Drawn {
     pub fn write(&self, gpu: &Gpu, output: &Path, format: Format, stops: f32) -> Result<()> {
         let beauty = &self.frame.beauty;
         let [width, height] = [beauty.width as u32, beauty.height as u32];
-        let mut metadata = self.metadata(gpu);
+        let mut metadata = shown::metadata(gpu, command_line());
+        metadata.extend(self.facts.clone());
         match format {
             Format::Png(tonemap) => {
                 metadata.push(("Exposure".into(), format!("{stops} EV")));
@@ -74,23 +75,6 @@ impl Drawn {
             }
         }
         Ok(())
-    }
-
-    fn metadata(&self, gpu: &Gpu) -> Metadata {
-        let command: Vec<String> = std::env::args().skip(1).collect();
-        let driver = format!("{} {}", gpu.info.driver, gpu.info.driver_info);
-        let software = format!("bouncelight {}", env!("CARGO_PKG_VERSION"));
-        [
-            ("Software", software),
-            ("Command", format!("bouncelight {}", command.join(" "))),
-            ("Adapter", gpu.info.name.clone()),
-            ("Backend", format!("{:?}", gpu.info.backend).to_lowercase()),
-            ("Driver", driver.trim().into()),
-        ]
-        .map(|(k, v)| (k.to_string(), v))
-        .into_iter()
-        .chain(self.facts.clone())
-        .collect()
     }
 }
 

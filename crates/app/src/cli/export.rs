@@ -1,11 +1,10 @@
 //! `export`: what another host needs to run the pass itself.
 
-use super::args::{Global, MethodName, MethodParser, real_time, usage};
+use super::args::{Global, MethodName, MethodParser, one_of, real_time, usage};
 use super::scene_args::SceneArgs;
 use super::stdout::say;
 use anyhow::Result;
 use bouncelight_lab::export::{self, ExportError, Target};
-use clap::ValueEnum;
 use std::path::PathBuf;
 
 /// Flags of `export`.
@@ -21,8 +20,8 @@ pub struct Args {
     #[arg(long, value_name = "FILE", help_heading = EXPORT)]
     weights: Option<PathBuf>,
     /// Language of the shaders.
-    #[arg(long, value_enum, help_heading = EXPORT)]
-    target: TargetName,
+    #[arg(long, value_parser = one_of(Target::ALL.map(|t| (t.name(), t))), help_heading = EXPORT)]
+    target: Target,
     /// Folder to write: a new one, or an earlier export, which is replaced.
     #[arg(short, long, visible_alias = "out", value_name = "DIR", help_heading = EXPORT)]
     output: PathBuf,
@@ -38,24 +37,6 @@ Examples:
   bouncelight export scene.glb --target wgsl -o out/wgsl --size 1920x1080
   bouncelight export scene.glb --target spirv -o out/spirv --method neural";
 
-#[derive(Debug, Clone, Copy, ValueEnum)]
-#[allow(missing_docs, reason = "the variants are their own words on the command line")]
-enum TargetName {
-    Wgsl,
-    Glsl430,
-    Spirv,
-}
-
-impl TargetName {
-    fn target(self) -> Target {
-        match self {
-            Self::Wgsl => Target::Wgsl,
-            Self::Glsl430 => Target::Glsl430,
-            Self::Spirv => Target::Spirv,
-        }
-    }
-}
-
 pub fn run(global: &Global, args: Args) -> Result<()> {
     if args.weights.is_some() && !args.method.needs_weights() {
         return Err(usage("--weights is for --method neural".into()));
@@ -68,7 +49,7 @@ pub fn run(global: &Global, args: Args) -> Result<()> {
     let method = real_time(args.method, global, args.weights.as_ref())?;
     let scene = args.scene.load(global)?;
     let gpu = global.open_gpu()?;
-    let package = export::export((&gpu.device, &gpu.queue), &scene, &method, args.scene.size, args.target.target());
+    let package = export::export((&gpu.device, &gpu.queue), &scene, &method, args.scene.size, args.target);
     let package = package.map_err(refused)?;
     package.write(&args.output).map_err(refused)?;
     let (m, bytes) = (&package.manifest, package.files.iter().map(|f| f.1.len()).sum::<usize>());

@@ -1,10 +1,11 @@
 //! `bouncelight fit`: the cheapest method that is good enough for a scene, kept beside it.
 
 use super::{
-    args::{Global, usage},
+    args::{Global, number, usage},
     error::CliError,
     interrupt,
     progress::Progress,
+    record,
     scene_args::SceneArgs,
     stdout::say,
 };
@@ -85,8 +86,7 @@ enum Cost {
 }
 
 fn parse_budget(text: &str) -> Result<f64, String> {
-    let ms: f64 = text.parse().map_err(|e| format!("{e}"))?;
-    if ms.is_finite() && ms >= 0.0 { Ok(ms) } else { Err("a budget is 0 or more milliseconds".into()) }
+    number(text, |ms: f64| ms.is_finite() && ms >= 0.0, "a budget is 0 or more milliseconds")
 }
 
 fn learning_has_left(_: &str) -> Result<String, String> {
@@ -215,6 +215,5 @@ fn report(folder: &Path, heading: &str, found: &Fit, options: &FitOptions, fitte
         }
     }
     image_io::write_whole(&folder.join("fit.md"), page.as_bytes())?;
-    let record = serde_json::to_string_pretty(&found.record(options, fitted.clone()))?;
-    Ok(image_io::write_whole(&folder.join("fit.json"), format!("{record}\n").as_bytes())?)
+    Ok(record::write(&folder.join("fit.json"), &found.record(options, fitted.clone()))?)
 }

@@ -20,6 +20,7 @@ mod layers;
 mod log;
 mod picture;
 mod progress;
+mod record;
 mod render;
 mod scene_args;
 mod sequence;
@@ -104,9 +105,8 @@ impl Command {
             Command::View(_) => true,
             Command::Render(a) => a.runs_network(),
             Command::Bench(a) => a.runs_network(),
-            Command::Apply(_) | Command::Demo(_) | Command::Fit(_) => true,
+            Command::Apply(_) | Command::Chart(_) | Command::Demo(_) | Command::Fit(_) => true,
             Command::Stability(a) => a.runs_network(),
-            Command::Chart(a) => a.runs_network(),
             Command::Weights(a) => a.runs_network(),
             Command::Compare(_) | Command::Dataset(_) | Command::Doctor(_) | Command::Export(_) | Command::Trace(_) => {
                 false

@@ -160,7 +160,7 @@ pub fn run(global: &Global, mut args: Args) -> Result<()> {
     // Says from here on what the program does: without a shader cache nothing is drawn for half a
     // minute.
     let progress = Progress::compiling(global, if sequence.is_some() { "frames" } else { "samples" }, 1);
-    let mut raster = Raster::new(&args, (&gpu, global.textures()), &scene, method, layers.unwrap_or_default())?;
+    let mut raster = Raster::new(&args, (&gpu, global.textures), &scene, method, layers.unwrap_or_default())?;
     if let Some(sequence) = sequence {
         return film(progress, &args, showing, raster, (&sequence, scene));
     }

@@ -2,7 +2,7 @@
 //! sheets, a record and a page.
 
 use super::{
-    args::{Global, MethodName, real_time, usage},
+    args::{Global, MethodName, command_line, real_time, usage},
     error::CliError,
     interrupt,
     progress::Progress,
@@ -222,15 +222,12 @@ fn tell(finding: &Finding) {
 }
 
 fn write(args: &Args, record: &Record) -> Result<()> {
-    let text = format!("{}\n", serde_json::to_string_pretty(record)?);
     let beside = args.out.as_ref().map(|out| out.join("stability.json"));
     for path in args.json.iter().chain(&beside) {
-        image_io::write_whole(path, text.as_bytes())?;
+        super::record::write(path, record)?;
     }
     if let Some(path) = &args.limits {
-        let words: Vec<String> = std::env::args().skip(1).collect();
-        let page = stability::page(record, &format!("bouncelight {}", words.join(" ")));
-        image_io::write_whole(path, page.as_bytes())?;
+        image_io::write_whole(path, stability::page(record, &command_line()).as_bytes())?;
     }
     Ok(())
 }

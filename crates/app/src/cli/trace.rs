@@ -2,7 +2,7 @@
 //! with progress, and what is told of the noise.
 
 use super::{
-    args::{Global, usage},
+    args::{Global, number, usage},
     drawn::{Drawn, parse_layers},
     error::CliError,
     interrupt,
@@ -76,17 +76,12 @@ Examples:
   bouncelight trace interior -o look.png --spp 16 --denoise";
 
 fn parse_error_bound(text: &str) -> Result<f64, String> {
-    let bound: f64 = text.parse().map_err(|e| format!("{e}"))?;
-    if bound.is_finite() && bound > 0.0 {
-        Ok(bound)
-    } else {
-        Err("no number of samples gets there; it must be above 0, such as 0.05 for 5 % noise a pixel".into())
-    }
+    let otherwise = "no number of samples gets there; it must be above 0, such as 0.05 for 5 % noise a pixel";
+    number(text, |bound: f64| bound.is_finite() && bound > 0.0, otherwise)
 }
 
 fn parse_limit(text: &str) -> Result<f32, String> {
-    let clamp: f32 = text.parse().map_err(|e| format!("{e}"))?;
-    if clamp.is_finite() && clamp >= 0.0 { Ok(clamp) } else { Err("it must be 0 (none) or above".into()) }
+    number(text, |clamp: f32| clamp.is_finite() && clamp >= 0.0, "it must be 0 (none) or above")
 }
 
 pub fn run(global: &Global, args: Args) -> Result<()> {
@@ -179,22 +174,19 @@ impl Task {
             // No watchdog there, and other programs may want the cores, too.
             options.dispatch *= 4;
         }
-        let mut tracer =
-            Tracer::new(&gpu.device, &gpu.queue, &kernel, &packed, subject, options).map_err(|e| match e {
-                TracerError::Points { .. } | TracerError::Option(_) => usage(e.to_string()),
-                e => e.into(),
-            })?;
+        let tracer = Tracer::new(&gpu.device, &gpu.queue, &kernel, &packed, subject, options).map_err(|e| match e {
+            TracerError::Points { .. } | TracerError::Option(_) => usage(e.to_string()),
+            e => e.into(),
+        })?;
         let mut progress = Progress::new(global, "samples", tracer.expected_samples());
-        while tracer.step()? {
-            let expected = tracer.expected_samples();
-            progress.at(tracer.progress() * expected as f64, expected);
-            if interrupt::requested() {
-                return Err(CliError::Interrupted.into());
-            }
-        }
+        let traced = tracer.run(|t| {
+            let expected = t.expected_samples();
+            progress.at(t.progress() * expected as f64, expected);
+            !interrupt::requested()
+        })?;
         progress.finish();
         interrupt::check()?;
-        let mut traced = tracer.finish()?;
+        let mut traced = traced.ok_or(CliError::Interrupted)?;
         if !global.quiet {
             eprintln!("{}", sentence(&traced));
         }

@@ -62,7 +62,7 @@ pub fn run(global: &Global, args: Args) -> Result<()> {
         size: args.size,
         captures: args.captures,
         gpu: global.gpu_options(),
-        textures: global.textures(),
+        textures: global.textures,
         precision: global.precision(),
         tuned: Some(|device| super::tuned::of(device, true)),
     };

@@ -1,7 +1,7 @@
 //! `bouncelight weights info | verify | convert | tune`: what a weights file holds, whether it is
 //! sound, and one from a published network.
 
-use super::args::{Global, parse_size};
+use super::args::{Global, command_line, one_of, parse_size};
 use super::stdout::say;
 use anyhow::{Context, Result};
 use bouncelight::net::{
@@ -10,7 +10,6 @@ use bouncelight::net::{
 };
 use bouncelight_lab::network::convert::{Arch, Norm, Recipe, convert};
 use bouncelight_scene::image_io;
-use clap::ValueEnum;
 use sha2::{Digest, Sha256};
 use std::path::{Path, PathBuf};
 
@@ -69,14 +68,14 @@ struct ConvertArgs {
     #[arg(help_heading = None)]
     input: PathBuf,
     /// Generator: Pix2Pix, or Deep Illumination (Thomas and Forbes 2018).
-    #[arg(long, value_enum)]
-    arch: ArchName,
+    #[arg(long, value_parser = one_of([("pix2pix", Arch::Pix2pix), ("deep-illumination", Arch::DeepIllumination)]))]
+    arch: Arch,
     /// Normalisation in training; `instance` for a batch-norm network run in training mode.
-    #[arg(long, value_enum)]
-    norm: NormName,
+    #[arg(long, value_parser = one_of([("group", Norm::Group), ("instance", Norm::Instance), ("batch", Norm::Batch)]))]
+    norm: Norm,
     /// Storage of convolution weights.
-    #[arg(long, value_enum, default_value = "f32")]
-    dtype: DtypeName,
+    #[arg(long, value_parser = one_of([("f32", Dtype::F32), ("f16", Dtype::F16)]), default_value = "f32")]
+    dtype: Dtype,
     /// Name of the network [default: the file's].
     #[arg(long)]
     name: Option<String>,
@@ -115,25 +114,6 @@ Examples:
   bouncelight weights convert in.safetensors --arch pix2pix --norm instance -o net.safetensors
   bouncelight weights convert in.safetensors --arch deep-illumination --norm batch -o di.safetensors";
 
-#[derive(Debug, Clone, Copy, ValueEnum)]
-enum ArchName {
-    Pix2pix,
-    DeepIllumination,
-}
-
-#[derive(Debug, Clone, Copy, ValueEnum)]
-enum NormName {
-    Group,
-    Instance,
-    Batch,
-}
-
-#[derive(Debug, Clone, Copy, ValueEnum)]
-enum DtypeName {
-    F32,
-    F16,
-}
-
 impl Args {
     /// It runs a network on a device.
     pub fn runs_network(&self) -> bool {
@@ -161,26 +141,15 @@ fn convert_file(args: &ConvertArgs) -> Result<()> {
     let bytes = Weights::read_bytes(&args.input)?;
     let name = |path: &Path| path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
     let mut provenance = Provenance::new();
-    let command: Vec<String> = std::env::args().skip(1).collect();
     let hash: String = Sha256::digest(&bytes).iter().map(|b| format!("{b:02x}")).collect();
     provenance.insert("converted_from".into(), name(&args.input).into());
     provenance.insert("sha256".into(), hash.into());
     provenance.insert("program".into(), format!("bouncelight {}", env!("CARGO_PKG_VERSION")).into());
-    provenance.insert("command".into(), format!("bouncelight {}", command.join(" ")).into());
+    provenance.insert("command".into(), command_line().into());
     let recipe = Recipe {
-        arch: match args.arch {
-            ArchName::Pix2pix => Arch::Pix2pix,
-            ArchName::DeepIllumination => Arch::DeepIllumination,
-        },
-        norm: match args.norm {
-            NormName::Group => Norm::Group,
-            NormName::Instance => Norm::Instance,
-            NormName::Batch => Norm::Batch,
-        },
-        dtype: match args.dtype {
-            DtypeName::F32 => Dtype::F32,
-            DtypeName::F16 => Dtype::F16,
-        },
+        arch: args.arch,
+        norm: args.norm,
+        dtype: args.dtype,
         name: args.name.clone().unwrap_or_else(|| name(&args.input)),
         licence: args.licence.clone(),
         provenance,

@@ -7,6 +7,7 @@ use super::state::State;
 use crate::shown;
 use bouncelight::accel::{AccelError, SceneRays};
 use bouncelight::gi::{Method, Neural, ambient::AmbientTerm, gather};
+use bouncelight::gpu::Gpu;
 use bouncelight::gpu_scene::{SceneGpu, TextureMemory};
 use bouncelight::net::{format::Weights, gpu::Tuned, plan::Precision};
 use bouncelight::render::capture::{CaptureOptions, Layer, capture_with};
@@ -284,20 +285,17 @@ pub struct Shot {
 
 impl Shot {
     /// Of what `state` shows on the left.
-    pub fn new(state: &State, network: Network, output: PathBuf, facts: image_io::Metadata) -> Option<Self> {
-        let shown = state.shown.as_ref()?;
+    pub fn new(state: &State, network: Network, output: PathBuf, gpu: &Gpu) -> Option<Self> {
+        let scene = state.shown.as_ref()?.scene.clone();
         let s = &state.settings;
-        let text = command::line(state, Some(&output.display().to_string()));
-        let mut metadata =
-            vec![("Software".into(), format!("bouncelight {}", env!("CARGO_PKG_VERSION"))), ("Command".into(), text)];
-        metadata.extend(facts);
+        let metadata = shown::metadata(gpu, command::line(state, Some(&output.display().to_string())));
         Some(Self {
             output,
             source: s.left,
             weights: s.weights.clone(),
             network,
-            scene: shown.scene.clone(),
-            camera: state.navigator.camera(&shown.scene, state.size),
+            camera: state.navigator.camera(&scene, state.size),
+            scene,
             textures: state.textures,
             size: state.size,
             samples: if s.left == Source::Reference { s.spp } else { s.samples },
@@ -315,7 +313,7 @@ impl Shot {
 }
 
 /// Draws the picture anew, away from the window, just as the command line would, and writes it.
-pub fn capture(gpu: &bouncelight::gpu::Gpu, shot: &Shot, progress: &Progress) -> Result<Product, String> {
+pub fn capture(gpu: &Gpu, shot: &Shot, progress: &Progress) -> Result<Product, String> {
     let cancelled = || Err("cancelled".to_string());
     let mut fallback = None;
     let (beauty, layers) = if shot.source == Source::Reference {
@@ -366,21 +364,16 @@ pub fn capture(gpu: &bouncelight::gpu::Gpu, shot: &Shot, progress: &Progress) ->
 /// The path tracer's picture and layers; `None` when cancelled.
 type Pictures = Option<(Vec<f32>, Vec<image_io::Layer>)>;
 
-fn trace(gpu: &bouncelight::gpu::Gpu, shot: &Shot, progress: &Progress) -> Result<Pictures, String> {
+fn trace(gpu: &Gpu, shot: &Shot, progress: &Progress) -> Result<Pictures, String> {
     progress.stage("tracing");
     let packed = ReferenceScene::new(&gpu.device, &gpu.queue, &shot.scene).map_err(|e| e.to_string())?;
     let kernel = Kernel::new(&gpu.device);
     let subject = Subject { camera: &shot.camera, size: shot.size, points: None };
     let layers = if shot.is_exr() { Traced::ALL.to_vec() } else { vec![Traced::Combined] };
     let options = TracerOptions { samples: shot.samples, layers, ..Default::default() };
-    let mut tracer =
-        Tracer::new(&gpu.device, &gpu.queue, &kernel, &packed, subject, options).map_err(|e| e.to_string())?;
-    while tracer.step().map_err(|e| e.to_string())? {
-        if !progress.at(tracer.progress()) {
-            return Ok(None);
-        }
-    }
-    let mut traced = tracer.finish().map_err(|e| e.to_string())?;
+    let tracer = Tracer::new(&gpu.device, &gpu.queue, &kernel, &packed, subject, options);
+    let traced = tracer.and_then(|t| t.run(|t| progress.at(t.progress()))).map_err(|e| e.to_string())?;
+    let Some(mut traced) = traced else { return Ok(None) };
     let (_, beauty) = traced.layers.remove(0);
     let layer = |(l, data): &(Traced, Vec<f32>)| image_io::Layer::new(l.name(), l.channels(), data);
     Ok(Some((beauty, traced.layers.iter().map(layer).collect())))

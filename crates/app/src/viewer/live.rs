@@ -3,7 +3,7 @@
 
 use super::jobs::Handles;
 use bouncelight::scene::{Camera, Scene};
-use bouncelight_lab::reference::{Kernel, Layer, ReferenceScene, Subject, Tracer, TracerOptions, preview};
+use bouncelight_lab::reference::{Kernel, Layer, ReferenceScene, Subject, Traced, Tracer, TracerOptions, preview};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
@@ -203,17 +203,9 @@ impl Work {
             if worth || !more {
                 (last, seen) = (Instant::now(), samples);
                 let traced = tracer.resolve().map_err(|e| e.to_string())?;
-                let layer = |l| traced.layer(l).map(<[f32]>::to_vec).unwrap_or_default();
-                send(Report::Picture(Box::new(Found {
-                    size,
-                    texel,
-                    radiance: layer(Layer::Combined),
-                    denoised: if self.subject.denoise { preview::denoise(traced, &self.camera) } else { None },
-                    indirect: layer(Layer::Gi),
-                    samples,
-                    noise: traced.noise[0].pixel,
-                    finished: !more,
-                })));
+                let (noise, finished) = (traced.noise[0].pixel, !more);
+                let found = Found { samples, noise, finished, ..self.found(traced, texel) };
+                send(Report::Picture(Box::new(found)));
             }
             if !more {
                 return Ok(());
@@ -240,10 +232,14 @@ impl Work {
                 return Ok(None);
             }
         }
-        let traced = tracer.resolve().map_err(|e| e.to_string())?;
+        Ok(Some(self.found(tracer.resolve().map_err(|e| e.to_string())?, texel)))
+    }
+
+    /// A picture that is not done, and whose samples nobody has counted.
+    fn found(&self, traced: &Traced, texel: u32) -> Found {
         let layer = |l| traced.layer(l).map(<[f32]>::to_vec).unwrap_or_default();
-        Ok(Some(Found {
-            size,
+        Found {
+            size: traced.size,
             texel,
             radiance: layer(Layer::Combined),
             denoised: if self.subject.denoise { preview::denoise(traced, &self.camera) } else { None },
@@ -251,7 +247,7 @@ impl Work {
             samples: 0,
             noise: f64::NAN,
             finished: false,
-        }))
+        }
     }
 }
 

@@ -3,16 +3,8 @@
 use super::frames::{Group, Numbers, Times};
 use super::rays;
 use super::stats::Spread;
+use bouncelight_lab::study::device::Device;
 use std::fmt::Write as _;
-
-/// What the numbers are of.
-#[derive(Debug, Clone)]
-pub struct About {
-    pub adapter: String,
-    pub backend: String,
-    pub driver: String,
-    pub software: bool,
-}
 
 /// One line of what is known: name, numbers, whether it is a part of the group above.
 struct Line<'a> {
@@ -51,7 +43,7 @@ fn lines(numbers: &Numbers) -> Vec<Line<'_>> {
 }
 
 /// A Markdown table with what it is of above.
-pub fn table(times: &Times, about: &About) -> String {
+pub fn table(times: &Times, about: &Device) -> String {
     let [w, h] = times.run.size;
     let rays = times.now.rays.map_or(String::new(), |n| {
         format!(" · {} rays a frame ({})", rays::count(n as f64), rays::share(times.run.rays))
@@ -81,7 +73,7 @@ fn field(text: &str) -> String {
 }
 
 /// Passes with what they were measured on in every row, so that files can be joined.
-pub fn passes_csv(times: &Times, about: &About) -> String {
+pub fn passes_csv(times: &Times, about: &Device) -> String {
     let mut text = "adapter,backend,driver,software,scene,method,width,height,group,pass,median_ms,p95_ms,mean_ms,\
         share,frames,rays,ray_share\n"
         .to_string();
@@ -137,7 +129,7 @@ mod tests {
             let passes = [("gbuffer", 1.0), ("gi.ssgi", 3.0), ("viewer.show", 9.0)].map(|(l, ms)| (l.to_string(), ms));
             times.frame(Instant::now(), &passes, 0.5, &run);
         }
-        let about = About { adapter: "A \"7\"".into(), backend: "vulkan".into(), driver: "d".into(), software: true };
+        let about = Device { adapter: "A \"7\"".into(), backend: "vulkan".into(), driver: "d".into(), software: true };
         assert!(!table(&times, &about).contains("rays"), "nobody has counted any");
         times.now.rays = Some(41_234);
         let table = table(&times, &about);

@@ -2,8 +2,11 @@
 //! the output.
 
 use super::cpu::Tensor;
-use bouncelight::net::format::Weights;
-use bouncelight::net::graph::Shape;
+use bouncelight::gpu::{
+    Gpu,
+    readback::{self, ReadbackError},
+};
+use bouncelight::net::{format::Weights, gpu::Network, graph::Shape};
 use thiserror::Error;
 
 /// Four pictures of one size, display values in [0, 1], RGB interleaved, rows from the top.
@@ -112,6 +115,22 @@ fn encoding(name: &str, values: &[f32]) -> [f32; 2] {
         }
         _ => [1.0, 0.0],
     }
+}
+
+/// Writes `input` where `network` reads it.
+pub fn upload(gpu: &Gpu, network: &Network, input: &Tensor) {
+    let place = network.input();
+    gpu.queue.write_buffer(place.buffer, place.offset, bytemuck::cast_slice(&input.to_padded()));
+}
+
+/// What the steps of `network` that were submitted have made.
+///
+/// # Errors
+/// [`ReadbackError`].
+pub fn download(gpu: &Gpu, network: &Network) -> Result<Tensor, ReadbackError> {
+    let (place, plan) = (network.output(), network.plan());
+    let bytes = readback::buffer(&gpu.device, &gpu.queue, place.buffer, place.offset, place.size)?;
+    Ok(Tensor::from_padded(plan.tensors[plan.output].shape, &bytemuck::pod_collect_to_vec::<u8, f32>(&bytes)))
 }
 
 /// The picture that `output` of meaning `display_signed` holds: (y + 1) / 2 in [0, 1], RGB

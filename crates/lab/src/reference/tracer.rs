@@ -225,6 +225,19 @@ impl Tracer {
         Ok(true)
     }
 
+    /// Steps until all is done. `None` where `go_on`, asked after each step, says no.
+    ///
+    /// # Errors
+    /// As [`Self::step`] and [`Self::finish`].
+    pub fn run(mut self, mut go_on: impl FnMut(&Self) -> bool) -> Result<Option<Traced>, TracerError> {
+        while self.step()? {
+            if !go_on(&self) {
+                return Ok(None);
+            }
+        }
+        self.finish().map(Some)
+    }
+
     /// True when all samples are done or the noise is small enough.
     pub fn is_finished(&self) -> bool {
         self.finished

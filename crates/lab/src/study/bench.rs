@@ -25,7 +25,7 @@ pub struct BenchOptions {
 }
 
 /// Median and 95th percentile over the counted frames, milliseconds.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 pub struct Spread {
     /// Median.
     pub median: f64,
@@ -44,7 +44,7 @@ pub struct PassTime {
 }
 
 /// What one method costs on one device.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Measurement {
     /// GI method.
     pub method: String,
@@ -143,36 +143,12 @@ pub enum BenchError {
 }
 
 /// Draws `options.warmup + options.frames` frames of the same view, waiting for each, and measures
-/// the latter.
+/// the latter. `cuts`: each frame is the first after a cut, on which methods with a history may spend
+/// more.
 ///
 /// # Errors
 /// [`BenchError`].
 pub fn measure(
-    gpu: &Gpu,
-    renderer: &mut Renderer,
-    scene: &SceneGpu,
-    camera: &Camera,
-    options: BenchOptions,
-) -> Result<Measurement, BenchError> {
-    measure_frames(gpu, renderer, scene, camera, options, false)
-}
-
-/// As [`measure`], but each frame is the first after a cut, on which methods with a history may
-/// spend more.
-///
-/// # Errors
-/// [`BenchError`].
-pub fn measure_cuts(
-    gpu: &Gpu,
-    renderer: &mut Renderer,
-    scene: &SceneGpu,
-    camera: &Camera,
-    options: BenchOptions,
-) -> Result<Measurement, BenchError> {
-    measure_frames(gpu, renderer, scene, camera, options, true)
-}
-
-fn measure_frames(
     gpu: &Gpu,
     renderer: &mut Renderer,
     scene: &SceneGpu,
@@ -214,9 +190,6 @@ fn measure_frames(
         passes: per_pass(&frames),
         gpu_ms: (!sums.is_empty()).then(|| spread(sums)),
         wall_ms: spread(wall),
-        costs: Vec::new(),
-        modelled: BTreeMap::new(),
-        modelled_at_rest: BTreeMap::new(),
         drawn: renderer.drawn(),
         bytes: renderer
             .bytes()
@@ -224,6 +197,7 @@ fn measure_frames(
             .chain([("scene", scene.bytes())])
             .map(|(n, b)| (n.to_string(), b))
             .collect(),
+        ..Measurement::default()
     })
 }
 

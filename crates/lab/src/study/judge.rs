@@ -5,6 +5,8 @@ use crate::metrics::{self, Comparison, MetricError, Options, Picture, Views};
 use crate::reference::Layer;
 use bouncelight::render::tonemap_curve::Tonemap;
 
+/// Depths from here on are nothing's, metres.
+pub(super) const NOTHING: f32 = 1e9;
 /// Edge of the blocks that light is compared over, pixels.
 pub const BLOCK: usize = 4;
 /// Least diffuse reflectance at which diffuse light is looked at.
@@ -68,7 +70,7 @@ fn weights(reference: &Reference) -> Option<Vec<bool>> {
     let (direct, indirect) = (reference.layer(Layer::DiffDir), reference.layer(Layer::DiffInd));
     let mean = |rgb: &[f32], p: usize| rgb[3 * p..3 * p + 3].iter().sum::<f32>() / 3.0;
     let light = |p: usize| mean(direct, p) + mean(indirect, p);
-    let surface = |p: usize| depth[p] < 1e9 && albedo[3 * p..3 * p + 3].iter().all(|c| *c > LEAST_ALBEDO);
+    let surface = |p: usize| depth[p] < NOTHING && albedo[3 * p..3 * p + 3].iter().all(|c| *c > LEAST_ALBEDO);
     let mut lit: Vec<f32> = (0..depth.len()).filter(|&p| surface(p)).map(light).collect();
     if lit.is_empty() {
         return None;
@@ -97,7 +99,8 @@ pub fn compare_shown(display: &[f32], reference: &Reference, flip: bool) -> Resu
     with_views(display, None, reference, flip)
 }
 
-fn shown(linear: &[f32]) -> Vec<f32> {
+/// What a saved picture of linear radiance shows: through Filmic, in 8-bit steps, shares of 255.
+pub(super) fn shown(linear: &[f32]) -> Vec<f32> {
     Tonemap::Filmic.apply_to_bytes(linear).into_iter().map(|b| f32::from(b) / 255.0).collect()
 }
 

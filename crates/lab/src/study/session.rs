@@ -161,23 +161,7 @@ impl<'a> Session<'a> {
 
     /// `frames` pictures one after the other by one renderer, which keeps its history; `change`
     /// says what each frame shows. Each is sampled through the pixels' centres. The scene is
-    /// afterwards as it was before. Only wanted frames are returned.
-    ///
-    /// # Errors
-    /// [`SessionError`].
-    pub fn sequence(
-        &mut self,
-        method: &Method,
-        change: &mut dyn FnMut(u32) -> FrameChange,
-        frames: u32,
-    ) -> Result<Vec<Frame>, SessionError> {
-        let mut shots = Vec::new();
-        self.render_sequence(method, change, frames, &mut |frame| shots.push(frame))?;
-        Ok(shots)
-    }
-
-    /// As [`Self::sequence`], handing each wanted picture over as soon as it is there: nothing but
-    /// one is in memory.
+    /// afterwards as it was before. Only wanted frames are handed to `take`, as soon as they are there.
     ///
     /// # Errors
     /// [`SessionError`].
@@ -264,7 +248,8 @@ impl<'a> Session<'a> {
         Ok(())
     }
 
-    /// What the method costs here, frame after frame of a still camera, at no time at rest.
+    /// What the method costs here, frame after frame of a still camera, at no time at rest; with `cuts`
+    /// each is the first after one.
     ///
     /// # Errors
     /// [`SessionError`].
@@ -273,23 +258,10 @@ impl<'a> Session<'a> {
         method: &Method,
         camera: &Camera,
         options: BenchOptions,
+        cuts: bool,
     ) -> Result<Measurement, SessionError> {
         let mut renderer = self.renderer(&method.clone().without_rest())?;
-        Ok(bench::measure(self.gpu, &mut renderer, &self.uploaded, camera, options)?)
-    }
-
-    /// The same where each frame is the first after a cut.
-    ///
-    /// # Errors
-    /// [`SessionError`].
-    pub fn measure_cuts(
-        &mut self,
-        method: &Method,
-        camera: &Camera,
-        options: BenchOptions,
-    ) -> Result<Measurement, SessionError> {
-        let mut renderer = self.renderer(method)?;
-        Ok(bench::measure_cuts(self.gpu, &mut renderer, &self.uploaded, camera, options)?)
+        Ok(bench::measure(self.gpu, &mut renderer, &self.uploaded, camera, options, cuts)?)
     }
 
     /// What the passes that find and add indirect light do in a frame of a still camera, settled

@@ -84,13 +84,8 @@ pub(super) fn trace(
         // No watchdog there, and other programs may want the cores, too.
         options.dispatch *= 4;
     }
-    let mut tracer = Tracer::new(&gpu.device, &gpu.queue, kernel, scene, subject, options)?;
-    while tracer.step()? {
-        if !go_on(tracer.progress()) {
-            return Err(SessionError::Stopped);
-        }
-    }
-    let traced = tracer.finish()?;
+    let tracer = Tracer::new(&gpu.device, &gpu.queue, kernel, scene, subject, options)?;
+    let traced = tracer.run(|t| go_on(t.progress()))?.ok_or(SessionError::Stopped)?;
     let (noise, samples, seconds) = (traced.noise, traced.samples, traced.seconds);
     Ok(Reference { size, layers: traced.layers, noise, samples, seconds, kept: false })
 }

@@ -78,7 +78,8 @@ fn sequences_keep_their_history_and_leave_the_scene_as_it_was() {
         cut: frame == 3,
         ..FrameChange::still(&camera)
     };
-    let shots = session.sequence(&method, &mut change, 4).expect("drawn");
+    let mut shots = Vec::new();
+    session.render_sequence(&method, &mut change, 4, &mut |shot| shots.push(shot)).expect("drawn");
     assert_eq!(shots.iter().map(|s| s.number).collect::<Vec<_>>(), [0, 2, 3]);
     // History goes on through frame 1, which nobody read, and ends at the cut.
     assert_eq!(shots.iter().map(|s| s.settled).collect::<Vec<_>>(), [Some(1), Some(3), Some(1)]);
@@ -123,5 +124,6 @@ fn whoever_watches_can_stop() {
     let stopped = |e| matches!(e, Err(SessionError::Stopped));
     assert!(stopped(session.picture(&method, &camera, Settling::SETTLED).map(|_| ())));
     assert!(stopped(session.trace(&camera, &truth::samples(4, 0)).map(|_| ())));
-    assert!(stopped(session.sequence(&Method::Direct, &mut |_| FrameChange::still(&camera), 2).map(|_| ())));
+    let mut change = |_| FrameChange::still(&camera);
+    assert!(stopped(session.render_sequence(&Method::Direct, &mut change, 2, &mut |_| ())));
 }

@@ -4,8 +4,9 @@ use super::App;
 use crate::viewer::choice::Side;
 use crate::viewer::frames::{Run, Times};
 use crate::viewer::jobs::Key;
-use crate::viewer::records::{self, About};
+use crate::viewer::records;
 use bouncelight::gpu::timing;
+use bouncelight_lab::study::device::Device;
 use bouncelight_scene::image_io::write_whole;
 use std::collections::{BTreeMap, VecDeque};
 use std::path::Path;
@@ -190,14 +191,8 @@ impl App {
     }
 
     /// What the numbers are of.
-    pub(super) fn about(&self) -> Option<About> {
-        let gpu = &self.stage.as_ref()?.gpu;
-        Some(About {
-            adapter: gpu.info.name.clone(),
-            backend: format!("{:?}", gpu.info.backend).to_lowercase(),
-            driver: format!("{} {}", gpu.info.driver, gpu.info.driver_info).trim().into(),
-            software: gpu.is_software(),
-        })
+    pub(super) fn about(&self) -> Option<Device> {
+        Some(Device::of(&self.stage.as_ref()?.gpu))
     }
 
     /// Writes the numbers of passes and of single frames.

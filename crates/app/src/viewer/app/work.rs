@@ -37,15 +37,7 @@ impl App {
             }),
             Request::Capture { exr } => {
                 let output = self.free_name("bouncelight", if exr { "exr" } else { "png" });
-                let info = &gpu.info;
-                let driver = format!("{} {}", info.driver, info.driver_info);
-                let facts = [
-                    ("Adapter", info.name.clone()),
-                    ("Backend", format!("{:?}", info.backend).to_lowercase()),
-                    ("Driver", driver),
-                ];
-                let facts = facts.map(|(k, v)| (k.to_string(), v)).into();
-                let Some(shot) = Shot::new(&self.state, self.network.clone(), output, facts) else { return };
+                let Some(shot) = Shot::new(&self.state, self.network.clone(), output, &gpu) else { return };
                 let name = format!("capture {}", shot.output.display());
                 self.spawn(name, Kind::Capture, move |p| jobs::capture(&gpu, &shot, p));
             }

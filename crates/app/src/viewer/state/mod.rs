@@ -44,7 +44,7 @@ pub struct Message {
 }
 
 /// The scene that is shown.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub struct Shown {
     /// What names it on the command line.
     pub spec: String,
@@ -202,16 +202,9 @@ impl State {
             spec,
             original: scene.clone(),
             lights: scene.lights.clone(),
-            unsettled: false,
             scene,
-            moved: BTreeMap::new(),
-            variant: None,
-            pose: None,
-            environment: None,
-            sky: None,
-            added: 0,
             extent,
-            sky_added: false,
+            ..Shown::default()
         });
         self.history.clear();
         self.stale = Stale::default();

@@ -1,6 +1,6 @@
 //! The panel's sections for how one looks: picture, camera, animation, window.
 
-use super::widgets::{drag, slider, wide};
+use super::widgets::{choose, drag, press, slider, tick, wide};
 use super::{Facts, Memory};
 use crate::viewer::film::Film;
 use crate::viewer::navigate::Preset;
@@ -17,34 +17,17 @@ pub(super) fn picture(ui: &mut Ui, state: &mut State, facts: &Facts<'_>) {
             if ui.add(slider(&mut ev, -8.0..=8.0).suffix(" EV").max_decimals(2)).changed() {
                 state.apply(Action::Exposure(ev));
             }
-            let mut auto = state.auto_exposure;
             let told = "Measured when accumulation ends after a change of the scene (Shift .)";
-            if ui.checkbox(&mut auto, "Auto").on_hover_text(told).changed() {
-                state.apply(Action::AutoExposure);
-            }
+            tick(ui, state.auto_exposure, state, "Auto", told, Action::AutoExposure);
         });
         ui.end_row();
         ui.label("Tonemap").on_hover_text("How radiance becomes what a screen can show (T)");
-        let mut kind = state.settings.tonemap;
-        egui::ComboBox::from_id_salt("tonemap").selected_text(kind.name()).width(wide(ui)).show_ui(ui, |ui| {
-            for t in Tonemap::ALL {
-                ui.selectable_value(&mut kind, t, t.name());
-            }
-        });
-        if kind != state.settings.tonemap {
-            state.apply(Action::Tonemap(Some(kind)));
-        }
+        let kind = choose(ui, "tonemap", state.settings.tonemap, &Tonemap::ALL, |t| t.name());
+        kind.into_iter().for_each(|kind| state.apply(Action::Tonemap(Some(kind))));
         ui.end_row();
         ui.label("Background").on_hover_text("The environment where nothing is hit; it lights the scene in any case");
-        let mut backdrop = state.settings.backdrop;
-        egui::ComboBox::from_id_salt("backdrop").selected_text(backdrop.name()).width(wide(ui)).show_ui(ui, |ui| {
-            for b in Backdrop::ALL {
-                ui.selectable_value(&mut backdrop, b, b.name());
-            }
-        });
-        if backdrop != state.settings.backdrop {
-            state.apply(Action::Backdrop(backdrop));
-        }
+        let backdrop = choose(ui, "backdrop", state.settings.backdrop, &Backdrop::ALL, |b| b.name());
+        backdrop.into_iter().for_each(|backdrop| state.apply(Action::Backdrop(backdrop)));
         ui.end_row();
         ui.label("Accumulate");
         let mut samples = state.settings.samples;
@@ -59,23 +42,16 @@ pub(super) fn picture(ui: &mut Ui, state: &mut State, facts: &Facts<'_>) {
     });
     let [still, all] = facts.still;
     ui.add(egui::ProgressBar::new(still as f32 / all.max(1) as f32).desired_height(4.0));
-    let mut coarse = state.settings.coarse;
     let told =
         "Every second pixel of each row and column while the view moves, where a frame takes more than 50 ms (Z)";
-    if ui.checkbox(&mut coarse, "Half resolution while moving").on_hover_text(told).changed() {
-        state.apply(Action::Coarse);
-    }
+    tick(ui, state.settings.coarse, state, "Half resolution while moving", told, Action::Coarse);
     ui.horizontal_wrapped(|ui| {
-        if ui.button("PNG").on_hover_text("Write what is seen on the left, without the panel (F12)").clicked() {
-            state.apply(Action::Capture { exr: false });
-        }
-        if ui.button("EXR").on_hover_text("The same as radiance, with Blender's layers (Shift F12)").clicked() {
-            state.apply(Action::Capture { exr: true });
-        }
+        let told = "Write what is seen on the left, without the panel (F12)";
+        press(ui, state, "PNG", told, Action::Capture { exr: false });
+        let told = "The same as radiance, with Blender's layers (Shift F12)";
+        press(ui, state, "EXR", told, Action::Capture { exr: true });
         let told = "Copy the `bouncelight render` line that draws this very view (K)";
-        if ui.button("Copy as command").on_hover_text(told).clicked() {
-            state.apply(Action::CopyCommand);
-        }
+        press(ui, state, "Copy as command", told, Action::CopyCommand);
     });
 }
 
@@ -127,13 +103,10 @@ pub(super) fn animation(
 
 pub(super) fn camera(ui: &mut Ui, state: &mut State) {
     ui.horizontal_wrapped(|ui| {
-        if ui.button("Fit").on_hover_text("All of the scene in view (F)").clicked() {
-            state.apply(Action::Fit);
-        }
+        press(ui, state, "Fit", "All of the scene in view (F)", Action::Fit);
         for preset in Preset::ALL {
-            if ui.button(preset.title()).on_hover_text("The whole scene from this side (V: the next one)").clicked() {
-                state.apply(Action::Preset(preset));
-            }
+            let told = "The whole scene from this side (V: the next one)";
+            press(ui, state, preset.title(), told, Action::Preset(preset));
         }
     });
     let cameras: Vec<String> = state.shown.iter().flat_map(|s| &s.scene.cameras).map(|c| c.name.clone()).collect();
@@ -159,11 +132,8 @@ pub(super) fn camera(ui: &mut Ui, state: &mut State) {
         ui.add(drag(speed, least..=most).speed(step).max_decimals(6).suffix(" m/s"))
             .on_hover_text("How fast W A S D Q E move; the wheel changes it while looking around");
     });
-    let mut long = state.navigator.is_long();
     let told = "A lens of 2° from far away, through which parallels stay nearly parallel (O)";
-    if ui.checkbox(&mut long, "Near-orthographic").on_hover_text(told).changed() {
-        state.apply(Action::LongLens);
-    }
+    tick(ui, state.navigator.is_long(), state, "Near-orthographic", told, Action::LongLens);
     let mut fov = state.navigator.fov;
     ui.spacing_mut().slider_width = (ui.available_width() - 150.0).max(40.0);
     let field = slider(&mut fov, 1.0..=150.0).text("Field of view").suffix("°").max_decimals(1);
@@ -174,9 +144,7 @@ pub(super) fn camera(ui: &mut Ui, state: &mut State) {
     ui.horizontal(|ui| {
         let records = matches!(state.film, Film::Records(_));
         let told = "Record how the camera is moved until this is pressed again, and write it to a file (R)";
-        if ui.button(if records { "Stop recording" } else { "Record path" }).on_hover_text(told).clicked() {
-            state.apply(Action::Record);
-        }
+        press(ui, state, if records { "Stop recording" } else { "Record path" }, told, Action::Record);
         let plays = matches!(state.film, Film::Plays { .. });
         let button = egui::Button::new(if plays { "Stop" } else { "Play path" });
         if ui.add_enabled(state.path.is_some(), button).on_hover_text("Play the recorded or dropped path (Y)").clicked()
@@ -198,13 +166,7 @@ pub(super) fn window(ui: &mut Ui, state: &mut State) {
             state.settings.zoom = zoom;
         }
     });
-    let mut full = state.full_screen;
-    if ui.checkbox(&mut full, "Full screen").on_hover_text("F11").changed() {
-        state.apply(Action::FullScreen);
-    }
-    let mut measure = state.measure;
+    tick(ui, state.full_screen, state, "Full screen", "F11", Action::FullScreen);
     let told = "Draw frame after frame, also where nothing changes; the live reference pauses meanwhile (B)";
-    if ui.checkbox(&mut measure, "Continuous rendering (benchmark)").on_hover_text(told).changed() {
-        state.apply(Action::Measure);
-    }
+    tick(ui, state.measure, state, "Continuous rendering (benchmark)", told, Action::Measure);
 }

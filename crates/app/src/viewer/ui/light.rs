@@ -1,6 +1,6 @@
 //! Lights and objects: listed, and changed in place.
 
-use super::widgets::{drag, slider};
+use super::widgets::{drag, press, slider};
 use super::{Memory, ORANGE, SKY};
 use crate::viewer::state::{Action, State, angles, from_angles};
 use bouncelight::scene::LightKind;
@@ -42,9 +42,7 @@ pub fn lights(ui: &mut Ui, state: &mut State, memory: &mut Memory) {
             }
             let told =
                 if i >= own { "takes it away" } else { "switches it off: lights of the file keep their numbers" };
-            if ui.button("Remove").on_hover_text(told).clicked() {
-                state.apply(Action::RemoveLight(i));
-            }
+            press(ui, state, "Remove", told, Action::RemoveLight(i));
         });
         memory.place(&format!("light {i}"), &shown.header_response);
     }
@@ -76,16 +74,9 @@ pub fn lights(ui: &mut Ui, state: &mut State, memory: &mut Memory) {
         }
     }
     ui.horizontal(|ui| {
-        if ui.button("Load environment…").on_hover_text("A lat-long picture: .hdr or .exr").clicked() {
-            state.apply(Action::Browse(true));
-        }
-        if ui
-            .button("Reset")
-            .on_hover_text("Lights, objects and environment as the file has them, and all rays (U)")
-            .clicked()
-        {
-            state.apply(Action::Reset);
-        }
+        press(ui, state, "Load environment…", "A lat-long picture: .hdr or .exr", Action::Browse(true));
+        let told = "Lights, objects and environment as the file has them, and all rays (U)";
+        press(ui, state, "Reset", told, Action::Reset);
     });
 }
 

@@ -1,6 +1,6 @@
 //! The panel's sections: scene, method, view.
 
-use super::widgets::{drag, slider, wide};
+use super::widgets::{drag, press, slider, tick, wide};
 use super::{Facts, Memory, camera, frontier, light, marks, source_box, times};
 use crate::viewer::choice::{Side, Source, View};
 use crate::viewer::rays;
@@ -83,9 +83,8 @@ fn scene(ui: &mut Ui, state: &mut State, memory: &mut Memory) {
         }
     }
     ui.horizontal(|ui| {
-        if ui.button("Open…").on_hover_text("Choose a file (Ctrl O), or drop one into the window").clicked() {
-            state.apply(Action::Browse(false));
-        }
+        let told = "Choose a file (Ctrl O), or drop one into the window";
+        press(ui, state, "Open…", told, Action::Browse(false));
         let hint = "file, interior, home:7";
         let room = (ui.available_width() - 56.0).max(40.0);
         let field = ui.add(egui::TextEdit::singleline(&mut memory.path).hint_text(hint).desired_width(room));
@@ -150,11 +149,8 @@ fn method(ui: &mut Ui, state: &mut State, memory: &mut Memory, facts: &Facts<'_>
         ui.label("Left").on_hover_text("What draws the picture, or its left side where it is split (M: next)");
         source_box(ui, "left", state, Side::Left);
         ui.end_row();
-        let mut split = state.settings.split;
         let told = "Two methods side by side; drag the line, or [ and ] (X)";
-        if ui.checkbox(&mut split, "Split").on_hover_text(told).changed() {
-            state.apply(Action::Split);
-        }
+        tick(ui, state.settings.split, state, "Split", told, Action::Split);
         source_box(ui, "right", state, Side::Right);
         ui.end_row();
         ui.label("Show").on_hover_text("The picture, or what it is made of (keys 1 to 9 and 0)");
@@ -266,8 +262,8 @@ fn weights(ui: &mut Ui, state: &mut State, memory: &mut Memory) {
     let name = now.as_ref().map_or("shipped".into(), |p| tail(&p.display().to_string(), 32));
     ui.horizontal(|ui| {
         ui.add(egui::Label::new(format!("Weights: {name}")).truncate());
-        if now.is_some() && ui.button("Shipped").on_hover_text("Back to those that come with the program").clicked() {
-            state.apply(Action::Weights(None));
+        if now.is_some() {
+            press(ui, state, "Shipped", "Back to those that come with the program", Action::Weights(None));
         }
     });
     ui.horizontal(|ui| {

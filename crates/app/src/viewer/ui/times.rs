@@ -1,6 +1,7 @@
 //! Where the time and the memory go.
 
 use super::table::{Line, table};
+use super::widgets::tick;
 use super::{Facts, Memory};
 use crate::viewer::state::{Action, State};
 use bouncelight::render::DrawnCount;
@@ -9,14 +10,8 @@ use egui::Ui;
 /// What was drawn, and where the times are.
 pub fn times(ui: &mut Ui, state: &mut State, memory: &mut Memory, facts: &Facts<'_>) {
     ui.horizontal(|ui| {
-        let mut shown = state.settings.timing.shown;
-        if ui
-            .checkbox(&mut shown, "Timing overlay (F3)")
-            .on_hover_text("passes, graph and sums over the picture")
-            .changed()
-        {
-            state.apply(Action::Timing);
-        }
+        let told = "passes, graph and sums over the picture";
+        tick(ui, state.settings.timing.shown, state, "Timing overlay (F3)", told, Action::Timing);
         if ui.button("Passes (Shift F3)").clicked() {
             state.apply(Action::ExpandTiming);
         }

@@ -6,7 +6,6 @@
 //! what was written.
 
 pub mod entries;
-mod on_pictures;
 pub mod plan;
 pub mod published;
 pub mod report;
@@ -17,12 +16,12 @@ pub mod summary;
 
 use super::{
     bench::{BenchError, Spread},
+    device::Device,
     projection::Cost,
     session::SessionError,
 };
 use crate::metrics::MetricError;
 use crate::network::pictures::PicturesError;
-use bouncelight::gpu::Gpu;
 use bouncelight::gpu_scene::UploadError;
 use bouncelight::net::gpu::NetError;
 use bouncelight_scene::SceneError;
@@ -105,7 +104,7 @@ pub struct Time {
 }
 
 /// One entry in one scene: a piece of the work.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Unit {
     /// Everything that decides the result; a piece with the same key is not done again.
     pub key: String,
@@ -176,34 +175,6 @@ pub struct SceneFacts {
     pub noise: Option<[f64; 2]>,
     /// Where it failed, and nothing was done in it.
     pub failed: Option<String>,
-}
-
-/// What everything ran on.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
-#[allow(missing_docs, reason = "the names say it")]
-pub struct Device {
-    pub adapter: String,
-    pub backend: String,
-    pub driver: String,
-    pub software: bool,
-}
-
-impl Device {
-    /// Of an opened device.
-    pub fn of(gpu: &Gpu) -> Self {
-        Self {
-            adapter: gpu.info.name.clone(),
-            backend: format!("{:?}", gpu.info.backend).to_lowercase(),
-            driver: format!("{} {}", gpu.info.driver, gpu.info.driver_info).trim().into(),
-            software: gpu.is_software(),
-        }
-    }
-
-    /// In words, with what a reader must know.
-    pub fn sentence(&self) -> String {
-        let kind = if self.software { "a CPU driver, no GPU" } else { "GPU" };
-        format!("{} ({kind}; {}, {})", self.adapter, self.backend, self.driver)
-    }
 }
 
 /// Where a record comes from.
@@ -292,9 +263,6 @@ pub enum ChartError {
     /// Reading back failed.
     #[error(transparent)]
     Readback(#[from] bouncelight::gpu::readback::ReadbackError),
-    /// The record cannot be turned into text.
-    #[error("the record cannot be written: {0}")]
-    Json(#[from] serde_json::Error),
     /// The driver refused a command.
     #[error("the GPU driver refused a command: {0}")]
     Driver(String),

@@ -1,7 +1,7 @@
 //! The work, piece by piece: what is done stays done, what fails loses nothing else.
 
 use super::{
-    ChartError, Device, Kind, Metric, Provenance, Record, SceneFacts, Unit,
+    ChartError, Kind, Metric, Provenance, Record, SceneFacts, Unit,
     entries::Entry,
     plan::Plan,
     published,
@@ -10,6 +10,7 @@ use super::{
 };
 use crate::reference;
 use crate::study::{
+    device::Device,
     hash, judge,
     session::{Session, SessionError, SessionOptions},
     truth,
@@ -222,47 +223,24 @@ impl<'a> Work<'a> {
             Some(unit) => unit,
             None => {
                 let done = self.guarded(|| stage.unit(self.gpu, self.plan, entry));
-                let empty = |failed| Unit {
-                    key: key.clone(),
-                    entry: name.clone(),
-                    scene: source.name.clone(),
-                    failed,
-                    scores: None,
-                    cold: None,
-                    time: None,
-                    cold_time: None,
-                    costs: Vec::new(),
-                    bytes: 0,
-                    fallback: None,
-                };
                 match done {
                     Err(ChartError::Stopped | ChartError::Session(SessionError::Stopped)) => {
                         return Err(ChartError::Stopped);
                     }
                     Err(e) => {
                         (self.hooks.warn)(&format!("{name} failed in {}: {e}", source.name));
-                        empty(Some(e.to_string()))
+                        Unit { failed: Some(e.to_string()), ..Unit::default() }
                     }
                     Ok(found) => {
-                        let failed = found.fallback.clone();
-                        if let Some(why) = &failed {
+                        if let Some(why) = &found.fallback {
                             (self.hooks.warn)(&format!("{name} is not drawn in {}: {why}", source.name));
                         }
-                        Unit {
-                            scores: Some(found.scores),
-                            cold: found.cold,
-                            time: Some(found.time),
-                            cold_time: found.cold_time,
-                            costs: found.costs,
-                            bytes: found.bytes,
-                            fallback: found.fallback,
-                            ..empty(failed)
-                        }
+                        Unit { failed: found.fallback.clone(), ..found }
                     }
                 }
             }
         };
-        self.record.units.push(Unit { scene: source.name.clone(), entry: name, ..unit });
+        self.record.units.push(Unit { key, scene: source.name.clone(), entry: name, ..unit });
         self.end(parts)
     }
 

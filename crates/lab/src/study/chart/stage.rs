@@ -1,9 +1,8 @@
 //! One scene at work: pictures, scores and times of one entry after the other.
 
 use super::{
-    Scores, Time,
+    Scores, Time, Unit,
     entries::Entry,
-    on_pictures,
     plan::Plan,
     published::{self, PIXELS},
 };
@@ -12,6 +11,7 @@ use crate::reference;
 use crate::study::{
     bench::{Measurement, Spread},
     judge::{self, LightError},
+    on_pictures,
     projection::Cost,
     session::{Frame, Session, Settling},
     truth::{self, Reference},
@@ -27,19 +27,9 @@ pub(super) struct Stage<'a> {
     pub reference: Reference,
 }
 
-/// What a piece found.
-pub(super) struct Found {
-    pub scores: Scores,
-    pub cold: Option<Scores>,
-    pub time: Time,
-    pub cold_time: Option<Time>,
-    pub costs: Vec<Cost>,
-    pub bytes: u64,
-    pub fallback: Option<String>,
-}
-
 impl Stage<'_> {
-    pub fn unit(&mut self, gpu: &Gpu, plan: &Plan, entry: &Entry) -> Result<Found, super::ChartError> {
+    /// What is found of an entry; where it comes from is for the caller to say.
+    pub fn unit(&mut self, gpu: &Gpu, plan: &Plan, entry: &Entry) -> Result<Unit, super::ChartError> {
         match entry {
             Entry::Method { method, .. } => {
                 let settling = Settling { samples: plan.samples, ..Settling::SETTLED };
@@ -47,20 +37,21 @@ impl Stage<'_> {
                 let mut cold = (None, None);
                 if method.has_history() && shot.fallback.is_none() {
                     let first = self.session.picture(method, &self.camera, Settling::COLD)?;
-                    let measured = self.session.measure_cuts(method, &self.camera, plan.bench)?;
+                    let measured = self.session.measure(method, &self.camera, plan.bench, true)?;
                     cold = (Some(self.judged(&first)?), Some(time(&measured)));
                 }
-                let measured = self.session.measure(method, &self.camera, plan.bench)?;
+                let measured = self.session.measure(method, &self.camera, plan.bench, false)?;
                 let costs =
                     if shot.fallback.is_none() { self.session.count(method, &self.camera)? } else { Vec::new() };
-                Ok(Found {
-                    scores: self.judged(&shot)?,
+                Ok(Unit {
+                    scores: Some(self.judged(&shot)?),
                     cold: cold.0,
-                    time: time(&measured),
+                    time: Some(time(&measured)),
                     cold_time: cold.1,
                     costs,
                     bytes: measured.total_bytes(),
                     fallback: shot.fallback,
+                    ..Unit::default()
                 })
             }
             Entry::Pictures { weights, .. } => {
@@ -68,19 +59,20 @@ impl Stage<'_> {
                 let settling = Settling { frames: 1, samples: plan.samples };
                 let shot = self.session.picture(&direct, &self.camera, settling)?;
                 let sky = self.session.scene().environment.radiance;
-                let (shown, network) = on_pictures::picture(gpu, weights, &shot, sky)?;
-                let raster = self.session.measure(&direct, &self.camera, plan.bench)?;
+                let network = published::network(gpu, weights, self.session.size())?;
+                let shown = on_pictures::picture::<super::ChartError>(gpu, (weights, &network), &shot, sky)?;
+                // A saved picture has 8 bits.
+                let shown: Vec<f32> = shown.into_iter().map(|v| (v * 255.0).round() / 255.0).collect();
+                let raster = self.session.measure(&direct, &self.camera, plan.bench, false)?;
                 let (frame, own) = (raster.wall_ms, published::time(gpu, &network, plan.bench)?);
                 let wall_ms = Spread { median: frame.median + own.median, p95: frame.p95 + own.p95 };
                 let seen = judge::compare_shown(&shown, &self.reference, true)?;
-                Ok(Found {
-                    scores: self.scores(None, &seen),
-                    cold: None,
-                    time: Time { gpu_ms: None, wall_ms },
-                    cold_time: None,
+                Ok(Unit {
+                    scores: Some(self.scores(None, &seen)),
+                    time: Some(Time { gpu_ms: None, wall_ms }),
                     costs: published::costs(&network),
                     bytes: raster.total_bytes() + network.bytes(),
-                    fallback: None,
+                    ..Unit::default()
                 })
             }
             Entry::Paths(count) => {
@@ -90,14 +82,11 @@ impl Stage<'_> {
                 let ms = 1e3 * traced.seconds;
                 let pixels = f64::from(traced.size[0]) * f64::from(traced.size[1]);
                 let paths = Cost::new("reference.path", 0.0, 0.0).with_rays(pixels * f64::from(*count));
-                Ok(Found {
-                    scores: self.scores(light, &seen),
-                    cold: None,
-                    time: Time { gpu_ms: None, wall_ms: Spread { median: ms, p95: ms } },
-                    cold_time: None,
+                Ok(Unit {
+                    scores: Some(self.scores(light, &seen)),
+                    time: Some(Time { gpu_ms: None, wall_ms: Spread { median: ms, p95: ms } }),
                     costs: vec![paths],
-                    bytes: 0,
-                    fallback: None,
+                    ..Unit::default()
                 })
             }
         }

@@ -6,7 +6,10 @@
 //! (Schlossmacher 1973).
 
 use crate::reference::Layer;
-use crate::study::{judge::BLOCK, truth::Reference};
+use crate::study::{
+    judge::{BLOCK, NOTHING},
+    truth::Reference,
+};
 use bouncelight::gi::ambient::AmbientTerm;
 
 /// Numbers that light is asked for: none, the sky alone, surfaces alone.
@@ -42,7 +45,7 @@ impl Problem {
             let (x0, y0) = (block % (width / BLOCK) * BLOCK, block / (width / BLOCK) * BLOCK);
             let pixels: Vec<usize> = (0..BLOCK * BLOCK).map(|i| (y0 + i / BLOCK) * width + x0 + i % BLOCK).collect();
             // As where light is judged: no rims, and nothing without a surface.
-            if pixels.iter().any(|&p| depth[p] >= 1e9) {
+            if pixels.iter().any(|&p| depth[p] >= NOTHING) {
                 continue;
             }
             for c in 0..3 {

@@ -11,13 +11,11 @@
 //! the target in any case.
 
 mod ambient_term;
-mod error;
 mod quality_target;
 mod report;
 mod rows;
 mod views;
 
-pub use error::FitError;
 pub use quality_target::{Metric, QualityTarget};
 pub use report::{Record, RecordRow};
 pub use rows::{Candidate, Row, Verdict};
@@ -38,6 +36,27 @@ use std::path::PathBuf;
 /// the size is four times as many.
 const COARSER: [f32; 3] = [1.0 / 8.0, 1.0 / 4.0, 1.0 / 2.0];
 const FINER: [f32; 2] = [1.0 / 32.0, 1.0 / 64.0];
+
+/// Why nothing could be fitted.
+#[derive(Debug, thiserror::Error)]
+pub enum FitError {
+    /// A picture could not be drawn or traced.
+    #[error(transparent)]
+    Session(#[from] SessionError),
+    /// Nothing to look at.
+    #[error(
+        "there is no view to judge: the scene has no camera that sees a surface; name one with --eye and --look-at"
+    )]
+    NoViews,
+    /// The metric says nothing of a view.
+    #[error("view {view}: {reason}; choose another view or metric")]
+    Blind {
+        /// Its number, from 0.
+        view: usize,
+        /// What is missing.
+        reason: String,
+    },
+}
 
 /// A network that may be chosen.
 pub struct Network {
@@ -352,7 +371,7 @@ impl Search<'_, '_> {
         let camera = self.views[0].camera.clone();
         if self.options.timed {
             let options = super::bench::BenchOptions { frames: 40, warmup: 20 };
-            let measured = self.session.measure(&method, &camera, options)?;
+            let measured = self.session.measure(&method, &camera, options, false)?;
             if measured.method != method.name() {
                 return Ok(None);
             }
@@ -361,7 +380,7 @@ impl Search<'_, '_> {
             }
             // Without timestamps that can be believed: the clock, less that of the rasteriser
             // alone.
-            let bare = self.session.measure(&bouncelight::gi::Method::Direct, &camera, options)?;
+            let bare = self.session.measure(&bouncelight::gi::Method::Direct, &camera, options, false)?;
             return Ok(Some((measured.wall_ms.median - bare.wall_ms.median).max(0.0)));
         }
         match self.session.count(&method, &camera) {

@@ -1,6 +1,7 @@
 //! Cameras that cover a scene, where its own do not.
 
 use crate::study::{
+    judge::NOTHING,
     session::{Session, SessionError, Settling},
     views,
 };
@@ -70,7 +71,7 @@ fn seen(
 
 fn cells(camera: &Camera, [width, height]: [u32; 2], depth: &[f32], (low, high): (Vec3, Vec3)) -> HashSet<[u8; 3]> {
     let size = high - low;
-    let mut shown: Vec<f32> = depth.iter().copied().filter(|d| *d < 1e9).collect();
+    let mut shown: Vec<f32> = depth.iter().copied().filter(|d| *d < NOTHING).collect();
     let tenth = shown.len() / 10;
     if (shown.len() as f32) < LEAST_SHOWN * depth.len() as f32
         || *shown.select_nth_unstable_by(tenth, f32::total_cmp).1 < NEAREST * size.length()
@@ -87,7 +88,7 @@ fn cells(camera: &Camera, [width, height]: [u32; 2], depth: &[f32], (low, high):
         let cell = ((point - low) / size.max(Vec3::splat(1e-6)) * CELLS).clamp(Vec3::ZERO, Vec3::splat(CELLS - 1.0));
         [cell.x as u8, cell.y as u8, cell.z as u8]
     };
-    depth.iter().enumerate().filter(|(_, d)| **d < 1e9).map(place).collect()
+    depth.iter().enumerate().filter(|(_, d)| **d < NOTHING).map(place).collect()
 }
 
 #[cfg(test)]

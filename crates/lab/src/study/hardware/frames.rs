@@ -130,14 +130,14 @@ fn one(
     let options = RendererOptions { method: method.without_rest(), ..Default::default() };
     let mut renderer = Renderer::new(&gpu.device, &gpu.queue, size, options)?;
     // Drivers compile at a shader's first use.
-    let pilot = measure(gpu, &mut renderer, uploaded, camera, BenchOptions { frames: 1, warmup: 1 })?;
+    let pilot = measure(gpu, &mut renderer, uploaded, camera, BenchOptions { frames: 1, warmup: 1 }, false)?;
     let affordable = seconds / (pilot.wall_ms.median * 1e-3).max(1e-6);
     let within = |share: f64, least: u32, most: u32| ((affordable * share) as u32).clamp(least, most);
     let options = BenchOptions {
         frames: within(0.65, LEAST.frames, MOST.frames),
         warmup: within(0.35, LEAST.warmup, MOST.warmup),
     };
-    Ok((measure(gpu, &mut renderer, uploaded, camera, options)?, options.frames))
+    Ok((measure(gpu, &mut renderer, uploaded, camera, options, false)?, options.frames))
 }
 
 /// Milliseconds of the passes that find and add indirect light.
@@ -173,11 +173,7 @@ mod tests {
             passes: vec![pass("render.gbuffer", 3.0), pass("gi.ambient", 1.0), pass("gi.ssr", 0.5)],
             gpu_ms: Some(at(4.5)),
             wall_ms: at(4.6),
-            bytes: Vec::new(),
-            costs: Vec::new(),
-            modelled: Default::default(),
-            modelled_at_rest: Default::default(),
-            drawn: Default::default(),
+            ..Measurement::default()
         };
         assert_eq!(own(&m, 3.0), (1.5, Timing::Timestamps));
         // A frame is waited for, too.

@@ -16,6 +16,7 @@ pub use frames::FrameRow;
 pub use network::NetworkRow;
 pub use parts::{RayRow, TracerRow};
 
+use super::device::Device;
 use crate::network::peak;
 use bouncelight::gpu::Gpu;
 use bouncelight::net::format::{Weights, WeightsError};
@@ -49,14 +50,9 @@ pub struct HardwareReport {
     pub commit: Option<String>,
     /// Hash of the shipped weights.
     pub weights: String,
-    /// The adapter's name.
-    pub adapter: String,
-    /// Graphics API.
-    pub backend: String,
-    /// The driver's name and version.
-    pub driver: String,
-    /// It runs on the processor.
-    pub software: bool,
+    /// What was measured.
+    #[serde(flatten)]
+    pub device: Device,
     /// It tells when passes begin and end.
     pub timestamps: bool,
     /// The program was built without optimisation for release: what runs on the processor is slower
@@ -174,10 +170,7 @@ pub fn measure(
         version: env!("CARGO_PKG_VERSION").into(),
         commit: None,
         weights: weights.hash_text(),
-        adapter: gpu.info.name.clone(),
-        backend: format!("{:?}", gpu.info.backend).to_lowercase(),
-        driver: format!("{} {}", gpu.info.driver, gpu.info.driver_info).trim().into(),
-        software: gpu.is_software(),
+        device: Device::of(gpu),
         timestamps: gpu.device.features().contains(wgpu::Features::TIMESTAMP_QUERY),
         debug_build: cfg!(debug_assertions),
         load,
@@ -196,7 +189,7 @@ pub fn measure(
 impl HardwareReport {
     /// A file name of small letters, digits and hyphens for the adapter: `nvidia-geforce-gtx-1050`.
     pub fn file_stem(&self) -> String {
-        let words = self.adapter.split(|c: char| !c.is_ascii_alphanumeric()).filter(|w| !w.is_empty());
+        let words = self.device.adapter.split(|c: char| !c.is_ascii_alphanumeric()).filter(|w| !w.is_empty());
         let name = words.collect::<Vec<_>>().join("-").to_ascii_lowercase();
         if name.is_empty() { "device".into() } else { name }
     }

@@ -30,7 +30,7 @@ fn times(large: &Card, small: &Card) -> f64 {
 impl HardwareReport {
     pub(super) fn write_shares(&self, out: &mut String) -> std::fmt::Result {
         writeln!(out, "\n## Small cards as shares of this one\n")?;
-        let Some(large) = Card::of_adapter(&self.adapter) else {
+        let Some(large) = Card::of_adapter(&self.device.adapter) else {
             return writeln!(out, "This device's data sheet is not known, so nothing can be said of a share of it.");
         };
         writeln!(
@@ -82,7 +82,7 @@ mod tests {
         let ms: f64 = row.split("**").nth(1).expect("a number").parse().expect("a number");
         assert!((ms - 4.42 * 26.4 / 15.82 * 1.363).abs() < 0.1, "{row}");
         assert!(text.contains("| GTX 1650 | 1/18.9 | `neural`"));
-        report.adapter = "llvmpipe".into();
+        report.device.adapter = "llvmpipe".into();
         assert!(report.markdown().contains("data sheet is not known"));
     }
 }

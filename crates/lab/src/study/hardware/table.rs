@@ -14,7 +14,7 @@ impl HardwareReport {
     }
 
     fn write(&self, out: &mut String) -> std::fmt::Result {
-        writeln!(out, "# {}\n", self.adapter)?;
+        writeln!(out, "# {}\n", self.device.adapter)?;
         writeln!(
             out,
             "Made by `cargo xtask gpu-report`; the numbers with all digits stand in the JSON file beside this one.\n"
@@ -22,14 +22,14 @@ impl HardwareReport {
         writeln!(
             out,
             "{} ({}), bouncelight {}{}, weights {}; {:.0} s.",
-            self.driver,
-            self.backend,
+            self.device.driver,
+            self.device.backend,
             self.version,
             self.commit.as_ref().map_or(String::new(), |c| format!(" at commit {c}")),
             self.weights,
             self.seconds
         )?;
-        if self.software {
+        if self.device.software {
             writeln!(out, "**A driver on the processor: a rehearsal, which says nothing about any GPU.**")?;
         }
         if self.debug_build {
@@ -62,7 +62,7 @@ impl HardwareReport {
     }
 
     fn write_frames(&self, out: &mut String) -> std::fmt::Result {
-        let here = Card::of_adapter(&self.adapter);
+        let here = Card::of_adapter(&self.device.adapter);
         writeln!(out, "## Methods\n")?;
         writeln!(
             out,

@@ -53,7 +53,7 @@ pub struct Fit {
 /// Fits the model to a record; none where its device's data sheet is not known, or nothing was
 /// counted with threads.
 pub fn fit(report: &HardwareReport) -> Option<Fit> {
-    let (card, rows) = (Card::of_adapter(&report.adapter)?, rows(report));
+    let (card, rows) = (Card::of_adapter(&report.device.adapter)?, rows(report));
     if rows.is_empty() {
         return None;
     }
@@ -107,7 +107,7 @@ pub fn fit(report: &HardwareReport) -> Option<Fit> {
     let at = |share: f64| (-sorted[((sorted.len() - 1) as f64 * share).round() as usize]).exp();
     let parameters = Parameters { spread: [round(at(0.9)), round(at(0.1))], ..parameters(&found.map(round)) };
     let model = Model {
-        adapter: report.adapter.clone(),
+        adapter: report.device.adapter.clone(),
         commit: report.commit.clone(),
         rows: rows.len(),
         within: round(shares[2]),
@@ -233,7 +233,7 @@ mod tests {
         // A step that shares no factor with their number mixes them.
         let count = times.len();
         all.iter_mut().enumerate().for_each(|(i, r)| r.ms = times[i * 101 % count]);
-        let card = Card::of_adapter(&report.adapter).expect("known");
+        let card = Card::of_adapter(&report.device.adapter).expect("known");
         let found = search(&all, &card, None);
         let errors: Vec<f64> = all.iter().map(|r| error(&found, r, &card)).collect();
         assert!(share(errors.iter()) < 0.45, "{}", share(errors.iter()));
@@ -249,7 +249,7 @@ mod tests {
         }
         assert_eq!(fit(&report), None);
         report = measured();
-        report.adapter = "llvmpipe".into();
+        report.device.adapter = "llvmpipe".into();
         assert_eq!(fit(&report), None);
     }
 }

@@ -2,6 +2,8 @@
 //! methods do wrong.
 
 use super::observation::Observation;
+use crate::study::judge::NOTHING;
+use bouncelight::numbers::SplitMix;
 
 /// What is done to every frame that a test looks at.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -47,7 +49,7 @@ impl Corruption {
     pub(super) fn spoil(self, look: &mut Observation, number: u64, before: Option<&Observation>, passed: u32) {
         let [width, height] = look.size.map(|n| n as usize);
         let depth = &look.depth;
-        let is_surface = |pixel: usize| depth[pixel] < super::observation::NOTHING;
+        let is_surface = |pixel: usize| depth[pixel] < NOTHING;
         let before = [before.map(|b| &b.light), before.map(|b| &b.rgb)];
         for (values, old) in [&mut look.light, &mut look.rgb].into_iter().zip(before) {
             for (pixel, at) in values.chunks_exact_mut(3).enumerate() {
@@ -83,10 +85,7 @@ impl Corruption {
     }
 }
 
-/// Uniform in [0, 1) by frame and pixel (SplitMix64's last steps).
+/// Uniform in [0, 1) by frame and pixel: the pair's place in one row of numbers.
 fn lot(frame: u64, pixel: u64) -> f32 {
-    let mut z = (frame << 32 | pixel).wrapping_add(1).wrapping_mul(0x9E37_79B9_7F4A_7C15);
-    z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-    z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-    ((z ^ (z >> 31)) >> 40) as f32 / (1u64 << 24) as f32
+    SplitMix::new((frame << 32 | pixel).wrapping_mul(0x9E37_79B9_7F4A_7C15)).next()
 }

@@ -83,6 +83,24 @@ pub struct Limit {
     pub source: &'static str,
 }
 
+impl Limit {
+    const fn share(name: &'static str, at_most: f64, source: &'static str) -> Self {
+        Self { name, unit: Unit::Share, at_most, source }
+    }
+
+    const fn frames(name: &'static str, at_most: f64, source: &'static str) -> Self {
+        Self { name, unit: Unit::Frames, at_most, source }
+    }
+
+    const fn count(name: &'static str, at_most: f64, source: &'static str) -> Self {
+        Self { name, unit: Unit::Count, at_most, source }
+    }
+
+    const fn flip(name: &'static str, at_most: f64, source: &'static str) -> Self {
+        Self { name, unit: Unit::Flip, at_most, source }
+    }
+}
+
 /// A named test.
 pub struct Test {
     /// Name, as `--suite` takes it.

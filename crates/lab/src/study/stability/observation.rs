@@ -1,11 +1,9 @@
 //! What a test sees of a frame, whoever drew it.
 
+use crate::study::judge::NOTHING;
 use bouncelight::render::View;
 use bouncelight::scene::Camera;
 use glam::{Mat4, Vec3, Vec4};
-
-/// Depths from here on are nothing's, metres.
-pub(super) const NOTHING: f32 = 1e9;
 
 /// One frame: indirect light, picture and places.
 #[derive(Debug, Clone)]

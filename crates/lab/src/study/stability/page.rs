@@ -25,10 +25,10 @@ fn head(w: &mut String, record: &Record, command: &str) -> std::fmt::Result {
          which also leaves a contact sheet of each test and, where something moves, a short sequence. Do not edit: \
          the program writes this page (version {}, on {}, {} {}{}).\n",
         record.version,
-        record.adapter,
-        record.backend,
-        record.driver,
-        if record.software { ", which is the CPU" } else { "" },
+        record.device.adapter,
+        record.device.backend,
+        record.device.driver,
+        if record.device.software { ", which is the CPU" } else { "" },
     )?;
     let weights: Vec<String> =
         record.subjects.iter().filter_map(|s| Some(format!("`{}` {}", s.name, s.weights.as_ref()?))).collect();

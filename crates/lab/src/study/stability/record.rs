@@ -1,6 +1,7 @@
 //! What a run of the tests has found, as JSON holds it.
 
 use super::{Test, Unit};
+use crate::study::device::Device;
 use serde::{Deserialize, Deserializer, Serialize};
 
 /// Version of the record's form.
@@ -13,14 +14,9 @@ pub struct Record {
     pub schema: u32,
     /// Version of the program.
     pub version: String,
-    /// Adapter that drew.
-    pub adapter: String,
-    /// Its graphics API.
-    pub backend: String,
-    /// Its driver.
-    pub driver: String,
-    /// It is the CPU.
-    pub software: bool,
+    /// What drew.
+    #[serde(flatten)]
+    pub device: Device,
     /// Who was tested.
     pub subjects: Vec<SubjectRecord>,
     /// One entry a test.
@@ -79,7 +75,7 @@ pub struct Criterion {
 }
 
 /// One subject's answer.
-#[derive(Debug, Clone, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, Serialize, Deserialize)]
 pub struct Found {
     /// Its name.
     pub subject: String,
@@ -205,7 +201,7 @@ mod unit {
 
     fn found(subject: &str, values: Vec<f64>, test: &Test) -> Found {
         let pass = Some(passes(test, &values));
-        Found { subject: subject.into(), values, pass, seconds: 1.0, reason: None, fallback: None, why: None }
+        Found { subject: subject.into(), values, pass, seconds: 1.0, ..Found::default() }
     }
 
     #[test]
@@ -254,10 +250,7 @@ mod unit {
         let record = Record {
             schema: SCHEMA,
             version: "0".into(),
-            adapter: "a".into(),
-            backend: "b".into(),
-            driver: "d".into(),
-            software: true,
+            device: Device { adapter: "a".into(), backend: "b".into(), driver: "d".into(), software: true },
             subjects: vec![subject("gather"), subject("odd")],
             tests: vec![finding],
         };

@@ -6,7 +6,7 @@ use super::{
     sheet::Row,
     test_run::Stage,
 };
-use crate::study::session::SessionError;
+use crate::study::{device::Device, session::SessionError};
 use bouncelight::gpu::Gpu;
 use bouncelight_scene::image_io;
 use std::{path::PathBuf, time::Instant};
@@ -92,17 +92,8 @@ impl<'a> Suite<'a> {
             tests.push(finding);
             stage.forget();
         }
-        let info = &self.gpu.info;
-        Ok(Record {
-            schema: SCHEMA,
-            version: env!("CARGO_PKG_VERSION").into(),
-            adapter: info.name.clone(),
-            backend: format!("{:?}", info.backend).to_lowercase(),
-            driver: format!("{} {}", info.driver, info.driver_info).trim().into(),
-            software: self.gpu.is_software(),
-            subjects: self.subjects(),
-            tests,
-        })
+        let version = env!("CARGO_PKG_VERSION").into();
+        Ok(Record { schema: SCHEMA, version, device: Device::of(self.gpu), subjects: self.subjects(), tests })
     }
 
     fn subjects(&self) -> Vec<SubjectRecord> {
@@ -168,15 +159,9 @@ impl<'a> Suite<'a> {
             }
             let started = Instant::now();
             let (values, kept) = take(subject, None);
-            let mut found = Found {
-                subject: subject.name().into(),
-                values: Vec::new(),
-                pass: None,
-                seconds: started.elapsed().as_secs_f64(),
-                reason: None,
-                fallback: kept.fallback,
-                why: None,
-            };
+            let seconds = started.elapsed().as_secs_f64();
+            let subject_name = subject.name().into();
+            let mut found = Found { subject: subject_name, seconds, fallback: kept.fallback, ..Found::default() };
             let shown;
             match keep_going(values)? {
                 Ok(values) => {
@@ -212,15 +197,7 @@ fn keep_going(values: Result<Vec<f64>, StabilityError>) -> Result<Result<Vec<f64
 }
 
 fn not_for_it(subject: &Subject, why: &str) -> Found {
-    Found {
-        subject: subject.name().into(),
-        values: Vec::new(),
-        pass: None,
-        seconds: 0.0,
-        reason: Some(why.into()),
-        fallback: None,
-        why: None,
-    }
+    Found { subject: subject.name().into(), reason: Some(why.into()), ..Found::default() }
 }
 
 /// `pass 0.1 %, 3` or `FAIL 12 %`.

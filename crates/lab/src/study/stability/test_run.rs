@@ -1,28 +1,20 @@
 //! Who draws what a test asks for: a method frame by frame with its history, the path tracer, or
 //! the paper's network.
 
-use super::{
-    Corruption, Script, StabilityError,
-    observation::{NOTHING, Observation},
-    sheet::Moment,
-};
-use crate::network::{
-    cpu::Tensor,
-    pictures::{self, Pictures},
-};
+use super::{Corruption, Script, StabilityError, observation::Observation, sheet::Moment};
 use crate::reference::{Kernel, Layer as TracedLayer, TracerOptions};
 use crate::study::{
-    hash,
+    hash, on_pictures,
     session::{Frame, Session, SessionError, SessionOptions, Settling},
     truth,
 };
 use bouncelight::gi::Method;
-use bouncelight::gpu::{Gpu, readback, timing::Recorder};
+use bouncelight::gpu::Gpu;
 use bouncelight::net::{
     format::Weights,
     gpu::{Network, Options},
 };
-use bouncelight::render::{capture::Layer, tonemap_curve::Tonemap};
+use bouncelight::render::capture::Layer;
 use bouncelight::scene::{Camera, Scene};
 use std::{
     cell::{Cell, OnceCell, RefCell},
@@ -267,8 +259,7 @@ impl<'a> TestRun<'a> {
         Ok(looks)
     }
 
-    /// The paper's network: pictures as `training/bouncelight_training/pix2pix/pairs.py` makes
-    /// them, dropout as published.
+    /// The paper's network on pictures as it learnt from, dropout as published.
     fn painted(
         &self,
         weights: &Weights,
@@ -285,24 +276,12 @@ impl<'a> TestRun<'a> {
         for frame in script.wanted_only().0 {
             session.edit(&frame.edits)?;
             let shot = session.picture(&Method::Direct, &frame.camera, Settling::COLD)?;
-            let [depth, direct, diffuse, normal] = four_pictures(&shot, session.scene().environment.radiance);
-            let input = Pictures { size, depth: &depth, direct: &direct, diffuse: &diffuse, normal: &normal };
-            let input = pictures::input(weights, &input)?;
             self.frames.set(self.frames.get() + 1);
             network.set_seed(&gpu.queue, self.frames.get() as u32);
-            let place = network.input();
-            gpu.queue.write_buffer(place.buffer, place.offset, bytemuck::cast_slice(&input.to_padded()));
-            let mut encoder = gpu.device.create_command_encoder(&Default::default());
-            network.record(&mut Recorder::new(&mut encoder));
-            gpu.queue.submit([encoder.finish()]);
-            let place = network.output();
-            let bytes = readback::buffer(&gpu.device, &gpu.queue, place.buffer, place.offset, place.size)?;
-            let shape = network.plan().tensors[network.plan().output].shape;
-            let output = Tensor::from_padded(shape, &bytemuck::pod_collect_to_vec::<u8, f32>(&bytes));
-            let mut look = look_of(&shot, frame.camera);
-            look.light = pictures::picture(&output);
-            look.rgb.clone_from(&look.light);
-            looks.push(look);
+            let sky = session.scene().environment.radiance;
+            let light = on_pictures::picture::<StabilityError>(gpu, (weights, &network), &shot, sky)?;
+            let look = look_of(&shot, frame.camera);
+            looks.push(Observation { rgb: light.clone(), light, ..look });
         }
         Ok(looks)
     }
@@ -313,31 +292,4 @@ fn look_of(shot: &Frame, camera: Camera) -> Observation {
     let size = [shot.frame.beauty.width as u32, shot.frame.beauty.height as u32];
     let (light, rgb) = (data(Layer::DiffInd), shot.rgb());
     Observation { size, light, rgb, depth: data(Layer::Depth), normal: data(Layer::Normal), broken: 0, camera }
-}
-
-/// Depth, direct light, albedo and normals as the paper's network takes them: through Filmic, in
-/// 8-bit steps.
-fn four_pictures(shot: &Frame, sky: [f32; 3]) -> [Vec<f32>; 4] {
-    let shown = |linear: &[f32]| -> Vec<f32> {
-        Tonemap::Filmic.apply_to_bytes(linear).into_iter().map(|b| f32::from(b) / 255.0).collect()
-    };
-    let depth = &shot.layer(Layer::Depth).data;
-    let surfaces = depth.iter().copied().filter(|z| *z < NOTHING);
-    let (near, far) = surfaces.fold((f32::MAX, f32::MIN), |(near, far), z| (near.min(z), far.max(z)));
-    let scaled = |z: f32| if z < NOTHING { (z - near) / (far - near).max(1e-6) } else { 1.0 };
-    let grey: Vec<f32> = depth.iter().flat_map(|z| [scaled(*z); 3]).collect();
-    let (diffuse, glossy) = (&shot.layer(Layer::DiffCol).data, &shot.layer(Layer::GlossCol).data);
-    // The sky without occlusion, as Eevee counts it to direct light.
-    let direct: Vec<f32> = shot
-        .rgb()
-        .iter()
-        .enumerate()
-        .map(|(i, v)| {
-            let surface = if depth[i / 3] < NOTHING { 1.0 } else { 0.0 };
-            v + surface * sky[i % 3] * (diffuse[i] + glossy[i])
-        })
-        .collect();
-    let normals = shot.layer(Layer::Normal).data.chunks_exact(3);
-    let normal: Vec<f32> = normals.flat_map(|n| [n[0].max(0.0), (-n[2]).max(0.0), n[1].max(0.0)]).collect();
-    [shown(&grey), shown(&direct), shown(diffuse), shown(&normal)]
 }

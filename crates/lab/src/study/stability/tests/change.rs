@@ -1,6 +1,6 @@
 //! Lights and doors that change under a still camera.
 
-use super::super::{Corruption, Limit, Observation, Script, Test, Unit, measures, rooms};
+use super::super::{Corruption, Limit, Observation, Script, Test, measures, rooms};
 use super::{LONG, SMALL};
 use crate::study::session::Edits;
 use bouncelight::scene::{Camera, Light};
@@ -11,20 +11,10 @@ pub static SWITCH: Test = Test {
     name: "switch",
     question: "Does light follow a lamp that is switched off and on?",
     limits: &[
-        Limit { name: "frames until nine tenths are gone", unit: Unit::Frames, at_most: 6.0, source: SOON },
-        Limit {
-            name: "old light that is left after 30 frames",
-            unit: Unit::Share,
-            at_most: 0.02,
-            source: "twice the least contrast that an eye sees",
-        },
-        Limit { name: "frames until nine tenths are back", unit: Unit::Frames, at_most: 6.0, source: SOON },
-        Limit {
-            name: "light that is missing after 30 frames",
-            unit: Unit::Share,
-            at_most: 0.05,
-            source: "a fourteenth of a stop",
-        },
+        Limit::frames("frames until nine tenths are gone", 6.0, SOON),
+        Limit::share("old light that is left after 30 frames", 0.02, "twice the least contrast that an eye sees"),
+        Limit::frames("frames until nine tenths are back", 6.0, SOON),
+        Limit::share("light that is missing after 30 frames", 0.05, "a fourteenth of a stop"),
     ],
     control: Corruption::Late(0.93),
     size: SMALL,
@@ -62,18 +52,12 @@ pub static SWEEP: Test = Test {
     name: "sweep",
     question: "Does light follow a lamp that moves at 15 metres a second, evenly?",
     limits: &[
-        Limit {
-            name: "light on the way against light of the same lamp at rest",
-            unit: Unit::Share,
-            at_most: 0.15,
-            source: "a fifth of a stop",
-        },
-        Limit {
-            name: "second difference of all light from frame to frame, over its mean",
-            unit: Unit::Share,
-            at_most: 0.02,
-            source: "twice the least contrast that an eye sees",
-        },
+        Limit::share("light on the way against light of the same lamp at rest", 0.15, "a fifth of a stop"),
+        Limit::share(
+            "second difference of all light from frame to frame, over its mean",
+            0.02,
+            "twice the least contrast that an eye sees",
+        ),
     ],
     control: Corruption::Late(0.93),
     // All light is the mean of as many rays as there are cells: at 96×64 `gather` has 2.3 % of
@@ -113,24 +97,13 @@ pub static DOOR: Test = Test {
     name: "door",
     question: "Does a room go dark when the door to the lit room next to it is shut, and bright when it is opened?",
     limits: &[
-        Limit {
-            name: "frames until nine tenths are gone",
-            unit: Unit::Frames,
-            at_most: 12.0,
-            source: "a fifth of a second; a hand needs longer for the door",
-        },
-        Limit {
-            name: "light that is left after 30 frames",
-            unit: Unit::Share,
-            at_most: 0.02,
-            source: "twice the least contrast that an eye sees",
-        },
-        Limit {
-            name: "change of the open room's light after shutting and opening",
-            unit: Unit::Share,
-            at_most: 0.1,
-            source: "a seventh of a stop",
-        },
+        Limit::frames(
+            "frames until nine tenths are gone",
+            12.0,
+            "a fifth of a second; a hand needs longer for the door",
+        ),
+        Limit::share("light that is left after 30 frames", 0.02, "twice the least contrast that an eye sees"),
+        Limit::share("change of the open room's light after shutting and opening", 0.1, "a seventh of a stop"),
     ],
     control: Corruption::Late(0.95),
     size: SMALL,

@@ -1,6 +1,6 @@
 //! How much light there must be.
 
-use super::super::{Corruption, Limit, Observation, Test, Unit, measures, rooms};
+use super::super::{Corruption, Limit, Observation, Test, measures, rooms};
 use super::{LONG, SMALL};
 use bouncelight::scene::{Camera, Scene};
 
@@ -8,18 +8,12 @@ pub static ALBEDO: Test = Test {
     name: "albedo",
     question: "Is a room of surfaces that send nothing back, or everything, as bright as paths say?",
     limits: &[
-        Limit {
-            name: "all light, albedo 0.001, against what the sky gives an open floor",
-            unit: Unit::Share,
-            at_most: 0.05,
-            source: "physics: no place gets more than the sky's radiance",
-        },
-        Limit {
-            name: "all light, albedo 1, against the truth",
-            unit: Unit::Share,
-            at_most: 0.1,
-            source: "a seventh of a stop",
-        },
+        Limit::share(
+            "all light, albedo 0.001, against what the sky gives an open floor",
+            0.05,
+            "physics: no place gets more than the sky's radiance",
+        ),
+        Limit::share("all light, albedo 1, against the truth", 0.1, "a seventh of a stop"),
     ],
     control: Corruption::Gain(1.5),
     size: SMALL,
@@ -42,18 +36,12 @@ pub static FURNACE: Test = Test {
     name: "furnace",
     question: "Is there glow / (1 - albedo) everywhere in a closed room whose walls glow?",
     limits: &[
-        Limit {
-            name: "all light against the series, albedo 0.5",
-            unit: Unit::Share,
-            at_most: 0.02,
-            source: "physics: exact; 2 % for the last bounces",
-        },
-        Limit {
-            name: "all light against the series, albedo 0.8",
-            unit: Unit::Share,
-            at_most: 0.05,
-            source: "physics: exact; at 0.8 the twentieth bounce still has 1 %",
-        },
+        Limit::share("all light against the series, albedo 0.5", 0.02, "physics: exact; 2 % for the last bounces"),
+        Limit::share(
+            "all light against the series, albedo 0.8",
+            0.05,
+            "physics: exact; at 0.8 the twentieth bounce still has 1 %",
+        ),
     ],
     control: Corruption::Gain(1.1),
     size: SMALL,
@@ -78,12 +66,8 @@ fn furnace(albedo: f32) -> Scene {
     room
 }
 
-const SEALED_LIMIT: Limit = Limit {
-    name: "light inside over light outside",
-    unit: Unit::Share,
-    at_most: 0.001,
-    source: "physics: none; 0.1 % is ten stops below",
-};
+const SEALED_LIMIT: Limit =
+    Limit::share("light inside over light outside", 0.001, "physics: none; 0.1 % is ten stops below");
 
 pub static SEALED: Test = Test {
     name: "sealed",
@@ -123,13 +107,8 @@ pub static CORNER: Test = Test {
     name: "corner",
     question: "Does a lamp around the corner light a corridor as paths say?",
     limits: &[
-        Limit { name: "all light against the truth", unit: Unit::Share, at_most: 0.1, source: "a seventh of a stop" },
-        Limit {
-            name: "light near the corner over light at the end, against the same",
-            unit: Unit::Share,
-            at_most: 0.2,
-            source: "a quarter of a stop",
-        },
+        Limit::share("all light against the truth", 0.1, "a seventh of a stop"),
+        Limit::share("light near the corner over light at the end, against the same", 0.2, "a quarter of a stop"),
     ],
     control: Corruption::Screen(1.0),
     size: SMALL,

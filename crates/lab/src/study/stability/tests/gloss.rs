@@ -1,6 +1,6 @@
 //! Metal and mirrors: pictures, since what they show is no diffuse light.
 
-use super::super::{Corruption, Limit, Observation, StabilityError, Test, TestRun, Unit, measures, rooms};
+use super::super::{Corruption, Limit, Observation, StabilityError, Test, TestRun, measures, rooms};
 use super::LONG;
 use crate::metrics::{Picture, flip};
 use bouncelight::scene::{Camera, Material, Scene};
@@ -10,18 +10,12 @@ use glam::{Quat, Vec3};
 const SIZE: [u32; 2] = [128, 64];
 
 const LIMITS: &[Limit] = &[
-    Limit {
-        name: "HDR-FLIP on the balls against the truth",
-        unit: Unit::Flip,
-        at_most: 0.25,
-        source: "FLIP of `ssgi`'s whole pictures is 0.15 to 0.34 (docs/results/accuracy.md); HDR-FLIP takes the worst exposure",
-    },
-    Limit {
-        name: "all light from the balls against the truth",
-        unit: Unit::Share,
-        at_most: 0.15,
-        source: "a fifth of a stop",
-    },
+    Limit::flip(
+        "HDR-FLIP on the balls against the truth",
+        0.25,
+        "FLIP of `ssgi`'s whole pictures is 0.15 to 0.34 (docs/results/accuracy.md); HDR-FLIP takes the worst exposure",
+    ),
+    Limit::share("all light from the balls against the truth", 0.15, "a fifth of a stop"),
 ];
 
 pub static METAL: Test = Test {

@@ -1,6 +1,6 @@
 //! What must hold of any light: it is linear, it has its colour, it knows no metres.
 
-use super::super::{Corruption, Limit, Observation, StabilityError, Test, TestRun, Unit, measures, rooms};
+use super::super::{Corruption, Limit, Observation, StabilityError, Test, TestRun, measures, rooms};
 use super::SMALL;
 use bouncelight::scene::{Camera, Environment, LightKind, Scene};
 
@@ -32,13 +32,8 @@ pub static TWICE: Test = Test {
     name: "twice",
     question: "Is twice the light exactly twice the answer, and no light none?",
     limits: &[
-        Limit {
-            name: "difference of half the answer to twice the light",
-            unit: Unit::Share,
-            at_most: 0.001,
-            source: LINEAR,
-        },
-        Limit { name: "values above 0 without any light", unit: Unit::Count, at_most: 0.0, source: "physics" },
+        Limit::share("difference of half the answer to twice the light", 0.001, LINEAR),
+        Limit::count("values above 0 without any light", 0.0, "physics"),
     ],
     control: Corruption::Curve(0.9),
     size: SMALL,
@@ -60,12 +55,11 @@ pub static TWICE: Test = Test {
 pub static SUM: Test = Test {
     name: "sum",
     question: "Is the light of sun, lamp and sky together the sum of theirs apart?",
-    limits: &[Limit {
-        name: "difference of the whole from the sum, over 4×4 pixels",
-        unit: Unit::Share,
-        at_most: 0.05,
-        source: "physics; 5 % for the noise of four pictures",
-    }],
+    limits: &[Limit::share(
+        "difference of the whole from the sum, over 4×4 pixels",
+        0.05,
+        "physics; 5 % for the noise of four pictures",
+    )],
     control: Corruption::Curve(0.8),
     size: SMALL,
     paths: 64,
@@ -88,12 +82,7 @@ pub static SUM: Test = Test {
 pub static EXPOSURE: Test = Test {
     name: "exposure",
     question: "Is the answer the same, but for its scale, in light 64 times as weak and as strong?",
-    limits: &[Limit {
-        name: "largest difference of the scaled answers",
-        unit: Unit::Share,
-        at_most: 0.005,
-        source: "physics; ten steps of a half float",
-    }],
+    limits: &[Limit::share("largest difference of the scaled answers", 0.005, "physics; ten steps of a half float")],
     control: Corruption::Curve(0.99),
     size: SMALL,
     paths: 16,
@@ -119,12 +108,7 @@ fn scaled_back(look: &Observation, factor: f32) -> Observation {
 pub static SATURATED: Test = Test {
     name: "saturated",
     question: "Does pure red light stay pure red?",
-    limits: &[Limit {
-        name: "green and blue over red",
-        unit: Unit::Share,
-        at_most: 0.0,
-        source: "physics: a channel without light has none",
-    }],
+    limits: &[Limit::share("green and blue over red", 0.0, "physics: a channel without light has none")],
     control: Corruption::Grey(0.01),
     size: SMALL,
     paths: 16,
@@ -144,18 +128,16 @@ pub static UNITS: Test = Test {
     name: "units",
     question: "Is the light the same in a file whose unit is a thousand times too large or too small?",
     limits: &[
-        Limit {
-            name: "in millimetres taken for metres (1000 times as large)",
-            unit: Unit::Share,
-            at_most: 0.05,
-            source: "physics: the picture is the same; 5 % for noise",
-        },
-        Limit {
-            name: "in kilometres taken for metres (1000 times as small)",
-            unit: Unit::Share,
-            at_most: 0.05,
-            source: "physics: the picture is the same; 5 % for noise",
-        },
+        Limit::share(
+            "in millimetres taken for metres (1000 times as large)",
+            0.05,
+            "physics: the picture is the same; 5 % for noise",
+        ),
+        Limit::share(
+            "in kilometres taken for metres (1000 times as small)",
+            0.05,
+            "physics: the picture is the same; 5 % for noise",
+        ),
     ],
     control: Corruption::Metres(0.5),
     size: SMALL,

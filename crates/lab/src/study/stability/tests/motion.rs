@@ -1,10 +1,9 @@
 //! A moving camera, and what an object uncovers.
 
-use super::super::{Corruption, Limit, Observation, Script, StabilityError, Test, TestRun, Unit, measures, rooms};
+use super::super::{Corruption, Limit, Observation, Script, StabilityError, Test, TestRun, measures, rooms};
 use super::{LONG, SMALL};
 use crate::metrics::{Picture, flip};
-use crate::study::session::Edits;
-use bouncelight::render::tonemap_curve::Tonemap;
+use crate::study::{judge, session::Edits};
 use bouncelight::scene::Camera;
 use glam::Vec3;
 
@@ -13,12 +12,7 @@ const WARPED: &str = "change of light at the same places from frame to frame, ov
 pub static JITTER: Test = Test {
     name: "jitter",
     question: "Does light keep still where the camera trembles by less than a pixel?",
-    limits: &[Limit {
-        name: WARPED,
-        unit: Unit::Share,
-        at_most: 0.02,
-        source: "twice the least contrast that an eye sees",
-    }],
+    limits: &[Limit::share(WARPED, 0.02, "twice the least contrast that an eye sees")],
     control: Corruption::Noise(0.8),
     size: SMALL,
     paths: 128,
@@ -40,12 +34,11 @@ pub static SLOW_PAN: Test = Test {
 pub static FAST_PAN: Test = Test {
     name: "fast-pan",
     question: "Does light keep still on its surfaces in a pan of 5 degrees a frame?",
-    limits: &[Limit {
-        name: WARPED,
-        unit: Unit::Share,
-        at_most: 0.05,
-        source: "five times the least contrast: at 300 degrees a second an eye resolves little",
-    }],
+    limits: &[Limit::share(
+        WARPED,
+        0.05,
+        "five times the least contrast: at 300 degrees a second an eye resolves little",
+    )],
     run: |run| flicker(run, &std::array::from_fn::<f32, 8, _>(|i| 5.0 * (i + 1) as f32), 2),
     ..JITTER
 };
@@ -70,12 +63,11 @@ fn flicker(run: &TestRun<'_>, degrees: &[f32], pairs: usize) -> Result<Vec<f64>,
 pub static DOORWAY: Test = Test {
     name: "doorway",
     question: "Is a dark room right at once for a camera that walks in through its door?",
-    limits: &[Limit {
-        name: "light on the way against light at the same places after a rest",
-        unit: Unit::Share,
-        at_most: 0.15,
-        source: "a fifth of a stop",
-    }],
+    limits: &[Limit::share(
+        "light on the way against light at the same places after a rest",
+        0.15,
+        "a fifth of a stop",
+    )],
     control: Corruption::Late(0.9),
     size: SMALL,
     paths: 64,
@@ -104,19 +96,13 @@ pub static TELEPORT: Test = Test {
     name: "teleport",
     question: "Does a room that was never seen before show its own light in the first frame after a jump?",
     limits: &[
-        Limit {
-            name: "the old room's light in the new one, method not told",
-            unit: Unit::Share,
-            at_most: 0.01,
-            source: "1 % (Weber)",
-        },
-        Limit { name: "the same, method told (a cut)", unit: Unit::Share, at_most: 0.01, source: "1 % (Weber)" },
-        Limit {
-            name: "first frame after a cut against the settled one",
-            unit: Unit::Share,
-            at_most: 0.25,
-            source: "first frames of real scenes are off by up to 21 % (docs/results/accuracy.md)",
-        },
+        Limit::share("the old room's light in the new one, method not told", 0.01, "1 % (Weber)"),
+        Limit::share("the same, method told (a cut)", 0.01, "1 % (Weber)"),
+        Limit::share(
+            "first frame after a cut against the settled one",
+            0.25,
+            "first frames of real scenes are off by up to 21 % (docs/results/accuracy.md)",
+        ),
     ],
     control: Corruption::Late(0.5),
     size: SMALL,
@@ -149,13 +135,12 @@ pub static DISOCCLUSION: Test = Test {
     name: "disocclusion",
     question: "Is what an object uncovers right in the first frame?",
     limits: &[
-        Limit {
-            name: "FLIP within 8 pixels of what was uncovered, first frame against a later one",
-            unit: Unit::Flip,
-            at_most: 0.05,
-            source: "settled pictures differ from the truth by 0.045 (docs/results/accuracy.md)",
-        },
-        Limit { name: "change of its light", unit: Unit::Share, at_most: 0.15, source: "a fifth of a stop" },
+        Limit::flip(
+            "FLIP within 8 pixels of what was uncovered, first frame against a later one",
+            0.05,
+            "settled pictures differ from the truth by 0.045 (docs/results/accuracy.md)",
+        ),
+        Limit::share("change of its light", 0.15, "a fifth of a stop"),
     ],
     control: Corruption::Noise(0.8),
     size: SMALL,
@@ -190,10 +175,7 @@ pub static DISOCCLUSION: Test = Test {
 fn after_uncovering(looks: &[Observation]) -> Result<[f64; 2], StabilityError> {
     let ring = measures::uncovered(&looks[0], &looks[1], 8);
     let gain = 0.2 / (looks[2].rgb.iter().sum::<f32>() / looks[2].rgb.len() as f32).max(1e-9);
-    let shown = |look: &Observation| -> Vec<f32> {
-        let linear: Vec<f32> = look.rgb.iter().map(|v| v * gain).collect();
-        Tonemap::Filmic.apply_to_bytes(&linear).into_iter().map(|b| f32::from(b) / 255.0).collect()
-    };
+    let shown = |look: &Observation| judge::shown(&look.rgb.iter().map(|v| v * gain).collect::<Vec<_>>());
     let (first, later) = (shown(&looks[1]), shown(&looks[2]));
     let [w, h] = looks[1].size.map(|n| n as usize);
     let pictures = (Picture::new("first", w, h, &first)?, Picture::new("later", w, h, &later)?);

@@ -1,6 +1,6 @@
 //! What networks are known to do: splotches, coarse numbers, scenes unlike those they have learnt.
 
-use super::super::{Corruption, Limit, Observation, StabilityError, Subject, Test, Unit, measures, rooms};
+use super::super::{Corruption, Limit, Observation, StabilityError, Subject, Test, measures, rooms};
 use super::{LONG, PAPER, SMALL};
 use bouncelight::gi::Method;
 use bouncelight::net::plan::Precision;
@@ -11,12 +11,11 @@ use glam::{Quat, Vec3};
 pub static FLAT: Test = Test {
     name: "flat",
     question: "Is a plain wall in even light free of splotches?",
-    limits: &[Limit {
-        name: "standard deviation over 8×8 pixels of what should be even",
-        unit: Unit::Share,
-        at_most: 0.02,
-        source: "physics: under an open sky a floor has one light; twice the least contrast that an eye sees",
-    }],
+    limits: &[Limit::share(
+        "standard deviation over 8×8 pixels of what should be even",
+        0.02,
+        "physics: under an open sky a floor has one light; twice the least contrast that an eye sees",
+    )],
     control: Corruption::Screen(0.5),
     size: PAPER,
     paths: 8,
@@ -34,7 +33,7 @@ pub static FLAT: Test = Test {
 pub static HALF: Test = Test {
     name: "half",
     question: "Is the answer of a network stored in 16 bits that of 32?",
-    limits: &[Limit { name: "difference", unit: Unit::Share, at_most: 0.005, source: "ten steps of a half float" }],
+    limits: &[Limit::share("difference", 0.005, "ten steps of a half float")],
     control: Corruption::Noise(0.1),
     size: SMALL,
     paths: 8,
@@ -62,12 +61,11 @@ pub static HALF: Test = Test {
 pub static UNSEEN: Test = Test {
     name: "unseen",
     question: "Is the light right in a scene of shapes and textures that no training has seen?",
-    limits: &[Limit {
-        name: "error of light over 4×4 pixels",
-        unit: Unit::Share,
-        at_most: 0.15,
-        source: "the worst real scene's is 17 % (docs/results/accuracy.md)",
-    }],
+    limits: &[Limit::share(
+        "error of light over 4×4 pixels",
+        0.15,
+        "the worst real scene's is 17 % (docs/results/accuracy.md)",
+    )],
     control: Corruption::Gain(1.3),
     size: [128, 64],
     paths: 128,

@@ -1,27 +1,22 @@
 //! A still camera before a still scene.
 
-use super::super::{Corruption, Limit, Script, StabilityError, Test, TestRun, Unit, measures, rooms};
+use super::super::{Corruption, Limit, Script, StabilityError, Test, TestRun, measures, rooms};
 use super::{LONG, PAPER, SMALL};
 use bouncelight::scene::{Camera, Scene};
 
 const STILL: &str = "half of the least contrast that an eye sees, 1 % (Weber)";
 
-const CHANGE: Limit = Limit { name: "change from frame to frame", unit: Unit::Share, at_most: 0.005, source: STILL };
-const SPARK: Limit = Limit {
-    name: "largest change of a pixel (99.9th percentile, of the mean light)",
-    unit: Unit::Share,
-    at_most: 0.05,
-    source: "a spark of 5 % in one frame of a thousandth of the picture",
-};
+const CHANGE: Limit = Limit::share("change from frame to frame", 0.005, STILL);
+const SPARK: Limit = Limit::share(
+    "largest change of a pixel (99.9th percentile, of the mean light)",
+    0.05,
+    "a spark of 5 % in one frame of a thousandth of the picture",
+);
 
 pub static FROZEN: Test = Test {
     name: "frozen",
     question: "Does a still picture come to rest within 100 frames?",
-    limits: &[
-        CHANGE,
-        SPARK,
-        Limit { name: "change of all light since frame 50", unit: Unit::Share, at_most: 0.01, source: "1 % (Weber)" },
-    ],
+    limits: &[CHANGE, SPARK, Limit::share("change of all light since frame 50", 0.01, "1 % (Weber)")],
     control: Corruption::Noise(0.1),
     size: SMALL,
     paths: 16,
@@ -37,12 +32,11 @@ pub static DARK_ROOM: Test = Test {
     limits: &[
         CHANGE,
         SPARK,
-        Limit {
-            name: "change of all light since frame 100",
-            unit: Unit::Share,
-            at_most: 0.02,
-            source: "twice the least contrast that an eye sees, over three seconds",
-        },
+        Limit::share(
+            "change of all light since frame 100",
+            0.02,
+            "twice the least contrast that an eye sees, over three seconds",
+        ),
     ],
     run: |run| {
         let (room, camera) = dark_room();
@@ -54,12 +48,11 @@ pub static DARK_ROOM: Test = Test {
 pub static REPEAT: Test = Test {
     name: "repeat",
     question: "Do the same frames give the same picture again?",
-    limits: &[Limit {
-        name: "largest difference of a value, of the mean",
-        unit: Unit::Share,
-        at_most: 0.0,
-        source: "to the bit: what differs by chance flickers",
-    }],
+    limits: &[Limit::share(
+        "largest difference of a value, of the mean",
+        0.0,
+        "to the bit: what differs by chance flickers",
+    )],
     control: Corruption::Noise(0.01),
     size: PAPER,
     paths: 4,

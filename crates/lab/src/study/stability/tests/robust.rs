@@ -1,6 +1,6 @@
 //! Odd sizes, odd scenes, numbers that are none.
 
-use super::super::{Corruption, Limit, Observation, Script, StabilityError, Test, TestRun, Unit, measures, rooms};
+use super::super::{Corruption, Limit, Observation, Script, StabilityError, Test, TestRun, measures, rooms};
 use super::SMALL;
 use crate::study::session::SessionError;
 use bouncelight::render::RenderError;
@@ -9,7 +9,7 @@ use bouncelight::scene::{Camera, LightKind, Mesh, Scene};
 pub static SIZES: Test = Test {
     name: "sizes",
     question: "Are pictures of any size, and of scenes with next to nothing in them, finite and whole?",
-    limits: &[Limit { name: "pictures that are not", unit: Unit::Count, at_most: 0.0, source: "a program that works" }],
+    limits: &[Limit::count("pictures that are not", 0.0, "a program that works")],
     control: Corruption::Broken,
     size: SMALL,
     paths: 1,
@@ -76,18 +76,12 @@ pub static BROKEN: Test = Test {
     name: "broken-input",
     question: "Do normals, glow and lights that are no numbers leave the rest of the picture alone?",
     limits: &[
-        Limit {
-            name: "pixels that are no numbers",
-            unit: Unit::Count,
-            at_most: 0.0,
-            source: "one NaN spreads to everything that reads it",
-        },
-        Limit {
-            name: "change of the light elsewhere",
-            unit: Unit::Share,
-            at_most: 0.1,
-            source: "the broken box and lamp take part of the room's light with them",
-        },
+        Limit::count("pixels that are no numbers", 0.0, "one NaN spreads to everything that reads it"),
+        Limit::share(
+            "change of the light elsewhere",
+            0.1,
+            "the broken box and lamp take part of the room's light with them",
+        ),
     ],
     control: Corruption::Broken,
     size: SMALL,

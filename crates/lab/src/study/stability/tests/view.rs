@@ -1,6 +1,6 @@
 //! What is seen must not decide what light there is.
 
-use super::super::{Corruption, Limit, Script, Test, Unit, measures, rooms};
+use super::super::{Corruption, Limit, Script, Test, measures, rooms};
 use super::{LONG, PAPER, SMALL};
 use bouncelight::scene::Camera;
 
@@ -10,18 +10,8 @@ pub static RED_WALL: Test = Test {
     name: "red-wall",
     question: "Does a sunlit red wall still light the floor when it has left the picture?",
     limits: &[
-        Limit {
-            name: "change of light at the same places, over 4×4 pixels",
-            unit: Unit::Share,
-            at_most: 0.05,
-            source: SAME,
-        },
-        Limit {
-            name: "change of red over green there",
-            unit: Unit::Share,
-            at_most: 0.02,
-            source: "twice the least contrast that an eye sees",
-        },
+        Limit::share("change of light at the same places, over 4×4 pixels", 0.05, SAME),
+        Limit::share("change of red over green there", 0.02, "twice the least contrast that an eye sees"),
     ],
     control: Corruption::Screen(0.5),
     size: PAPER,
@@ -49,12 +39,7 @@ pub static RED_WALL: Test = Test {
 pub static CROP: Test = Test {
     name: "crop",
     question: "Do the same pixels show the same light in a narrower picture?",
-    limits: &[Limit {
-        name: "change of light at the same places, over 4×4 pixels",
-        unit: Unit::Share,
-        at_most: 0.05,
-        source: SAME,
-    }],
+    limits: &[Limit::share("change of light at the same places, over 4×4 pixels", 0.05, SAME)],
     control: Corruption::Screen(1.0),
     size: PAPER,
     paths: 160,
@@ -73,12 +58,7 @@ pub static CROP: Test = Test {
 pub static TWO_PLACES: Test = Test {
     name: "two-places",
     question: "Are the same surfaces equally bright from two places?",
-    limits: &[Limit {
-        name: "change of light at the same places, over 4×4 pixels",
-        unit: Unit::Share,
-        at_most: 0.05,
-        source: SAME,
-    }],
+    limits: &[Limit::share("change of light at the same places, over 4×4 pixels", 0.05, SAME)],
     control: Corruption::Screen(0.5),
     size: SMALL,
     paths: 96,
