@@ -391,19 +391,22 @@ proptest! {
 }
 
 #[test]
-fn the_shipped_filter_is_modelled_within_a_millisecond_and_a_half() {
+fn the_shipped_filter_is_modelled_within_a_millisecond() {
     use bouncelight_lab::study::projection::{Cost, GTX_1050, modelled};
     let weights = Weights::shipped().expect("it is whole");
     let ms = |precision, packed_input| {
         let options = Options { precision, packed_input, ..Options::default() };
         let plan = Plan::with(&weights.graph, 256, 128, &options).expect("it fits");
         let costs: Vec<Cost> = plan.steps.iter().map(|s| Cost::of_step(&plan, s, &s.name)).collect();
+        // Equal taps of an enlarged input are added up beforehand.
+        let done: f64 = costs.iter().map(|c| c.flops).sum();
+        assert!(done < 0.75 * plan.flops() as f64, "{done} of {}", plan.flops());
         modelled(&costs, &GTX_1050).ms
     };
     let [full, half, packed] = [(Precision::F32, false), (Precision::F16, false), (Precision::F16, true)]
         .map(|(precision, packed)| ms(precision, packed));
     println!("{full:.3} ms in 32 bits, {half:.3} in 16 with an input of 32, {packed:.3} with one of 16");
-    assert!(packed < 1.5, "{packed}");
+    assert!(packed < 0.9, "{packed}");
     // Negative control: what it takes as other networks run.
-    assert!(full > 1.5 && half > packed, "{full} {half}");
+    assert!(full > 0.9 && half > packed, "{full} {half}");
 }
