@@ -142,7 +142,7 @@ impl Schedule {
         after.still = if still { self.still + 1 } else { 0 };
         let rests = rules.rest && !rules.progressive && after.still >= FRAMES_TO_REST && after.changing_left == 0;
         let jittered = events.shift != self.shift;
-        if rests && !jittered && after.still % REST_PERIOD != 0 {
+        if rests && !jittered && !after.still.is_multiple_of(REST_PERIOD) {
             return (None, after);
         }
         let updates = match (number, after.responsive_left) {
