@@ -70,6 +70,7 @@ impl Host {
         let inputs = Inputs {
             motion: Some(&host.motion),
             conventions: self.conventions,
+            moves_with_world: true,
             ..Inputs::new(host.size, &host.depth, &host.normal, host.matrices)
         };
         self.view.record(&mut encoder, &self.world, &inputs, &host.light)?;

@@ -53,6 +53,7 @@ mod tests {
             scene_version: 1,
             view: 1,
             shift: [0; 2],
+            cells_hold: true,
         };
         let mut schedule = Schedule::default();
         let next = |k| {

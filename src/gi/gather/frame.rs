@@ -72,6 +72,7 @@ impl GatherGi {
             scene_version: valid.rays.scene.version(),
             view: valid.camera.view(),
             shift: valid.camera.shift().map(f32::to_bits),
+            cells_hold: inputs.moves_with_world && self.filtered,
         };
         let (frame, schedule) = self.schedule.next(&events, rules);
         let means = frame.map(|frame| {
@@ -82,6 +83,7 @@ impl GatherGi {
             self.record_frame(recorder, queue, inputs, &valid, &frame, params)
         });
         self.schedule = schedule;
+        self.filtered = false;
         let specular = inputs.specular.unwrap_or(&self.no_specular).clone();
         Ok(Accumulated { inputs: valid.bound, specular, means })
     }
@@ -300,6 +302,7 @@ impl GatherGi {
         outputs: Outputs<'_>,
     ) {
         let guidance = guidance.unwrap_or_else(|| Bound::from(&self.no_guidance));
+        self.filtered = true;
         self.blur(recorder, accumulated, guidance.clone());
         self.atrous(recorder, accumulated, guidance);
         let store = &self.store;

@@ -156,6 +156,8 @@ pub struct GatherGi {
     unused_specular: wgpu::TextureView,
     /// What the next frame has to know of the earlier ones.
     schedule: Schedule,
+    /// The last frame was filtered, not only accumulated.
+    filtered: bool,
 }
 
 impl GatherGi {
@@ -238,6 +240,7 @@ impl GatherGi {
             scene,
             frame_params,
             schedule: Schedule::default(),
+            filtered: false,
         }
     }
 

@@ -30,13 +30,14 @@ pub struct Options {
     /// light is missing then.
     pub caustics: bool,
     /// Rays of the picture's cells a frame, spent where histories are shortest. Up to 1: a share of one
-    /// a cell, from the 34th frame of a view on (1: as many as cells ask for, at rest a fourth). Above:
+    /// a cell, from the 34th frame of a view on (1: as many as cells ask for). Above:
     /// a number that holds from the first frame on, but for cells without a history, which send one.
     /// Few: noise, and light that follows changes slowly. Without effect where `progressive`.
     pub rays: f32,
     /// Less is done once neither camera nor scene has changed for
-    /// [`FRAMES_TO_REST`](super::FRAMES_TO_REST) frames: a fourth of the rays under jitter, else three
-    /// frames in four show the cells of the last one. Off: all frames take as long.
+    /// [`FRAMES_TO_REST`](super::FRAMES_TO_REST) frames. Without jitter, and where all that moves is
+    /// [told](crate::gi::Inputs::moves_with_world), three frames in four show the cells of the last
+    /// one. Else frames send a fourth of the rays. Off: all frames take as long.
     pub rest: bool,
     /// Seed of the cells' rays: other noise, same light.
     pub seed: u32,

@@ -27,7 +27,8 @@ const WIDE_BLUR_FRAMES: u32 = 5;
 /// Frames of an unchanged scene seen by a still camera after which a picture rests.
 pub const FRAMES_TO_REST: u32 = 64;
 
-/// At rest one frame in so many is drawn, where jitter moves no pixel. The others show its cells again.
+/// At rest one frame in so many is drawn, where pixels show what they showed. The others show its
+/// cells again.
 pub const REST_PERIOD: u32 = 4;
 
 /// What a frame is drawn of.
@@ -47,6 +48,8 @@ pub(super) struct Events {
     pub view: u64,
     /// How far jitter shifts the picture, as bits.
     pub shift: [u32; 2],
+    /// The last frame's cells are those of this one's pixels, if nothing above says otherwise.
+    pub cells_hold: bool,
 }
 
 /// What is asked of all frames.
@@ -83,8 +86,8 @@ pub(super) struct Frame {
     pub frames_since_change: Option<u32>,
     /// The wide blur is used.
     pub wide_blur: bool,
-    /// Nothing has changed for long but for jitter: a fourth of the rays suffices. Other pixels have
-    /// other surfaces, so all filters are needed.
+    /// Nothing that is told has changed for long: a fourth of the rays suffices. Pixels may show other
+    /// surfaces, by jitter or by what is not told, so all filters are needed.
     pub rest: bool,
 }
 
@@ -141,8 +144,8 @@ impl Schedule {
         let still = number > 0 && !changed && events.view == self.view;
         after.still = if still { self.still + 1 } else { 0 };
         let rests = rules.rest && !rules.progressive && after.still >= FRAMES_TO_REST && after.changing_left == 0;
-        let jittered = events.shift != self.shift;
-        if rests && !jittered && !after.still.is_multiple_of(REST_PERIOD) {
+        let shown_again = events.shift == self.shift && events.cells_hold;
+        if rests && shown_again && !after.still.is_multiple_of(REST_PERIOD) {
             return (None, after);
         }
         let updates = match (number, after.responsive_left) {
@@ -164,7 +167,7 @@ impl Schedule {
             all_entries: number == 0 || after.responsive_left > 0 || rules.progressive,
             frames_since_change: (after.changing_left > 0).then(|| CACHE_RESPONSIVE_FRAMES - after.changing_left),
             wide_blur: number < WIDE_BLUR_FRAMES,
-            rest: rests && jittered,
+            rest: rests && !shown_again,
         };
         let after = Schedule {
             frames: number + 1,
@@ -199,8 +202,16 @@ mod tests {
     use super::*;
 
     const RULES: Rules = Rules { progressive: false, first_updates: 4, rest: true };
-    const STILL: Events =
-        Events { reset: false, resized: false, scene: 7, light_version: 1, scene_version: 1, view: 1, shift: [0; 2] };
+    const STILL: Events = Events {
+        reset: false,
+        resized: false,
+        scene: 7,
+        light_version: 1,
+        scene_version: 1,
+        view: 1,
+        shift: [0; 2],
+        cells_hold: true,
+    };
 
     /// The frames that `events` lead to, one after the other.
     fn frames(events: &[Events], rules: Rules) -> Vec<Frame> {
@@ -301,6 +312,9 @@ mod tests {
         let found = frames(&jittered, RULES);
         assert!(found.len() == 200 && found.iter().all(|f| f.rest == (f.number >= 64)));
         assert!(all.iter().all(|f| !f.rest));
+        // So where a host promises nothing.
+        let found = frames(&[Events { cells_hold: false, ..STILL }; 200], RULES);
+        assert!(found.len() == 200 && found.iter().all(|f| f.rest == (f.number >= 64)));
         // What is asked to converge goes on, and what is asked not to rest.
         assert_eq!(first(&rests(|_| (), Rules { progressive: true, ..RULES })), None);
         assert_eq!(first(&rests(|_| (), Rules { rest: false, ..RULES })), None);

@@ -86,6 +86,11 @@ pub struct Inputs<'a> {
     /// dropped. Default `false`. Set in every frame, pictures stay noisy; forgotten at a cut, old
     /// light shows for a few frames where surfaces happen to agree.
     pub reset: bool,
+    /// A promise that whatever changes in depth and normals, camera and jitter aside, is also told by
+    /// `rays` or `lights`: no skin, wind or dither beyond what rays meet. Then a still view may
+    /// [show its cells again](super::gather::Options::rest). Default `false`. Broken, what moves
+    /// shows light of up to three frames ago.
+    pub moves_with_world: bool,
 }
 
 impl<'a> Inputs<'a> {
@@ -111,6 +116,7 @@ impl<'a> Inputs<'a> {
             motion: None,
             specular: None,
             reset: false,
+            moves_with_world: false,
         }
     }
 }

@@ -112,8 +112,8 @@ impl Method {
         if self.has_history() { Self::SETTLED + 16 } else { 1 }
     }
 
-    /// Frames of a still camera after which a picture rests. Without jitter
-    /// [`gather::REST_PERIOD`] frames are a round then, in which one is drawn.
+    /// Frames of a still camera after which a whole round at rest begins: without jitter
+    /// [`gather::REST_PERIOD`] frames, of which one is drawn.
     pub fn frames_to_rest(&self) -> u32 {
         if self.has_history() { gather::FRAMES_TO_REST + gather::REST_PERIOD } else { 1 }
     }

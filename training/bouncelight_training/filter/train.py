@@ -319,19 +319,21 @@ def piles_of(config, same_names=False):
 
 def taught(piles, config):
     """Mixes the light that another network's filter shows into the targets: it is less noisy, and of all views that the network has seen."""
-    if not config.teacher or not config.taught:
+    asked = (config.teacher, config.taught) if config.teacher and config.taught else None
+    other = next((pile.taught_by for pile in piles if pile.taught_by not in (None, asked)), None)
+    if other:
+        raise TrainingError(f"views are mixed with the light of {other[0]} already")
+    if not asked:
         return
     teacher = network_of(config.teacher).to(config.device).eval()
     with torch.no_grad():
         for pile in piles:
-            if pile.taught_by == (config.teacher, config.taught):
+            if pile.taught_by == asked:
                 continue
-            if pile.taught_by:
-                raise TrainingError(f"views are mixed with the light of {pile.taught_by[0]} already")
             light = [blur.filtered(batch, teacher(batch["features"]))[0].clamp(min=0) for _, batch in in_parts(pile)]
             pile.fields["target"] = torch.lerp(pile.fields["target"], torch.cat(light), config.taught)
             pile.fields["noise"] = pile.fields["noise"] * (1 - config.taught)
-            pile.taught_by, pile.based_on = (config.teacher, config.taught), None
+            pile.taught_by, pile.based_on = asked, None
 
 
 def based(piles, pools):
