@@ -352,6 +352,9 @@ impl Renderer {
         let inputs = GbufferInputs { scene, before, deformed, view };
         self.passes.gbuffer.record(recorder, inputs, &self.targets, &mut drawn.camera);
         let mut inputs = gi_inputs(&self.targets, view, scene.environment.radiance, Some(scene));
+        // What is cut out by lot shows other surfaces in a frame of another number.
+        let same_lots = last.is_some_and(|last| last.seed == view.seed);
+        inputs.moves_with_world = same_lots || !scene.draws.iter().any(|draw| draw.covered);
         if let Some(lights) = &mut inputs.lights {
             lights.has_emissive_proxies &= picture_only;
         }

@@ -33,7 +33,7 @@ pub(super) fn gi_inputs<'a>(
         motion: Some(&targets.motion.view),
         specular: Some(&targets.specular.view),
         reset: false,
-        moves_with_world: true,
+        moves_with_world: false,
     }
 }
 

@@ -8,7 +8,7 @@ use bouncelight::gi::{Method, gather::Options, gather::RAYS_SENT};
 use bouncelight::gpu::{Gpu, readback, timing::Recorder};
 use bouncelight::gpu_scene::SceneGpu;
 use bouncelight::render::{Renderer, View, sampling};
-use bouncelight::scene::{Camera, LightKind, Scene};
+use bouncelight::scene::{AlphaMode, Camera, LightKind, Scene};
 
 const SIZE: [u32; 2] = [96, 64];
 const CELLS: f64 = 24.0 * 16.0;
@@ -178,6 +178,12 @@ fn nothing_is_lost_at_rest() {
     assert!(resting[0] == going[0] && resting[1] == resting[0] && resting[2] == resting[0]);
     // Negative control: without rest the next frame is another.
     assert!(going[1] != going[0] && resting[3] == going[1]);
+    // What is cut out by lot is another surface in each frame: all are drawn.
+    let mut leaves = room(20.0);
+    leaves.materials.iter_mut().for_each(|m| m.alpha_mode = AlphaMode::Blend);
+    let (mut renderer, drawn_leaves) = (gather(true), uploaded(&gpu, &leaves));
+    let _ = crate::gather::go_on(&gpu, &mut renderer, &drawn_leaves, &leaves.cameras[0], 80);
+    assert_eq!(renderer.settled(), Some(80));
     let jittered = |rest| go(&gpu, &mut gather(rest), &drawn, &scene.cameras[0], 200, true);
     for [asleep, awake] in [[resting[4].clone(), going[2].clone()], [jittered(true), jittered(false)]] {
         println!("{:.2} % off", 100.0 * difference(&asleep, &awake));
