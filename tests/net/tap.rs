@@ -44,6 +44,6 @@ fn every_layer_can_be_read_as_the_cpu_reference_computes_it() {
             before = Some(found);
             seen += 1;
         }
-        assert!(seen >= 8 && apart >= 1, "{seen} layers, {apart} of them unlike the one before");
+        assert!(seen == weights.graph.ops.len() && apart >= 3, "{seen} layers, {apart} of them unlike the one before");
     }
 }
