@@ -7,9 +7,8 @@
 A method `gather@N` is drawn after N frames of a still camera (1: the first after a cut), `gather@pan` after sixteen frames in which the
 camera, settled before, turned by 1 degree each; one without says nothing of frames and has the program's own default. `gather+caustics=0`
 (or another of its numbers) is drawn with `render --gather caustics=0`, for references made without Cycles' "Reflective Caustics"; `gather+taa@pan` under temporal
-anti-aliasing (over the pan, or the frames) in place of --samples. A method `neural:FILE` is the network of that weights file; its row is called `neural NAME` after the file. `apply:FILE` is a network on
-pictures (the paper's, pix2pix/): `bouncelight apply` on the four pictures of the raster; `dropout:FILE` is the same with dropout on,
-as the authors ran theirs. Both give 8-bit pictures, so they have no relmse and no light.
+anti-aliasing (over the pan, or the frames) in place of --samples. A method `neural:FILE` is the network of that weights file; its row is called `neural NAME` after the file. Generators
+(`generator`, `generator-gather`, `generator:FILE`) paint pictures, so they have no light.
 
 A folder of references holds either roomIIII_view0.exr, as cycles/paper_rooms.py writes them, or one folder a scene with scene.glb,
 frame0000.exr and meta.json. Rooms are averaged into one row a method; other scenes get a row each. With --rooms only these are taken, and
@@ -39,10 +38,8 @@ import tempfile
 
 import numpy as np
 import OpenEXR
-from PIL import Image
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
-from bouncelight_training.pix2pix.pairs import PICTURES, inputs_of  # noqa: E402
 from bouncelight_training.stream import indices  # noqa: E402
 
 # Radiance, W/(m² sr), below which nothing of a picture is seen: 8 bits at 16 times the exposure.
@@ -170,18 +167,9 @@ def all_methods(program):
     return re.search(r"--method\b.*?possible values: ([^\]]+)", text, re.DOTALL)[1].replace(",", " ").split()
 
 
-def draw(program, scene, row, path, size, samples, inputs):
-    """Draws `row` = (kind, weights) of a scene into `path`. `inputs`: the raster's EXR, for networks on pictures."""
+def draw(program, scene, row, path, size, samples):
+    """Draws `row` = (kind, weights) of a scene into `path`."""
     kind, weights = row
-    if kind in ("apply", "dropout"):
-        with tempfile.TemporaryDirectory() as folder:
-            flags = []
-            for name, picture in zip(PICTURES, inputs_of(inputs)):
-                flags += [f"--{name}", os.path.join(folder, f"{name}.png")]
-                Image.fromarray(picture).save(flags[-1])
-            command = [program, "apply", *flags, "--weights", weights, "-o", path, "-q"]
-            subprocess.run(command + (["--dropout", "1"] if kind == "dropout" else []), check=True)
-        return
     kind, _, state = kind.partition("@")
     kind, *options = kind.split("+")
     taa = ["--taa", str(PAN_FRAMES if state == "pan" else max(int(state or 32) - 1, 1))] if "taa" in options else None
@@ -254,15 +242,14 @@ def main():
         for method in ["direct"] + [m for m in a.methods if m != "direct"]:
             kind, _, weights = method.partition(":")
             row = f"{kind} {os.path.splitext(os.path.basename(weights))[0]}".strip()
-            picture = kind in ("apply", "dropout")
-            path = os.path.join(a.out, f"{name}_{row.replace(' ', '_')}.{'png' if picture else 'exr'}")
+            path = os.path.join(a.out, f"{name}_{row.replace(' ', '_')}.exr")
             stamp = f"{program} {digest(weights) if os.path.exists(weights) else weights} {a.samples} {width}x{height}"
             if not stamps.fresh(path, stamp):
-                draw(a.bouncelight, scene, (kind, weights), path, f"{width}x{height}", a.samples, os.path.join(a.out, f"{name}_direct.exr"))
+                draw(a.bouncelight, scene, (kind, weights), path, f"{width}x{height}", a.samples)
                 stamps.put(path, stamp)
-            drawn[method] = None if picture else layers(path)
+            drawn[method] = layers(path)
             if method in a.methods:
-                compare(group, name, row, path, reference, float("nan") if picture else light_error(drawn[method], drawn["direct"], truth, "+taa" in kind))
+                compare(group, name, row, path, reference, float("nan") if kind.startswith("generator") else light_error(drawn[method], drawn["direct"], truth, "+taa" in kind))
         extra = [("constant", with_constant(drawn["direct"], a.constant))] if a.constant else []
         extra += [("best constant", with_constant(drawn["direct"], best_constant(drawn["direct"], truth)))]
         for row, picture in extra:

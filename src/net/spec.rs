@@ -86,8 +86,13 @@ pub const CELLS_V1: &[FeatureRow] = &[
 const PICTURE: &[&str] = &["signed", "signed_stretched", "unit"];
 
 /// Table `images`, version 1: pictures as they are shown, pixel by pixel, in any order.
-pub const IMAGES_V1: &[FeatureRow] =
-    &[row("depth", 3, PICTURE), row("direct", 3, PICTURE), row("diffuse", 3, PICTURE), row("normal", 3, PICTURE)];
+pub const IMAGES_V1: &[FeatureRow] = &[
+    row("depth", 3, PICTURE),
+    row("direct", 3, PICTURE),
+    row("diffuse", 3, PICTURE),
+    row("normal", 3, PICTURE),
+    row("gathered", 3, PICTURE),
+];
 
 /// Every feature table, the newest version of each first.
 pub const TABLES: &[FeatureTable] = &[

@@ -1,5 +1,5 @@
 //! The frame, pass by pass: deform → shadow → gbuffer (→ lights) → direct → indirect → ssr →
-//! composite → blended (→ taa). A display adds `tonemap` after it.
+//! composite (→ pictures → network → paint) → blended (→ taa). A display adds `tonemap` after it.
 
 use super::RenderError;
 use super::blended::{BlendedInputs, Blending};
@@ -7,6 +7,7 @@ use super::composite::Backdrop;
 use super::cull::DrawnCount;
 use super::direct::DirectInputs;
 use super::gbuffer::GbufferInputs;
+use super::generator::Generator;
 use super::gi_inputs::{clear, gi_inputs};
 use super::light_choice::LightOptions;
 use super::lights::LightLists;
@@ -83,6 +84,8 @@ pub struct Renderer {
     method: &'static str,
     /// What fills `indirect`; nothing for direct light alone.
     indirect: Option<Box<dyn Technique>>,
+    /// What paints over the picture.
+    generator: Option<Generator>,
     passes: Passes,
     lights: LightOptions,
     backdrop: Backdrop,
@@ -115,6 +118,13 @@ impl Renderer {
         let mut taa = options.taa.then(|| TaaPass::new(device));
         let picture = passes.bind(device, &frame, &targets, &mut taa);
         let indirect = method::build(device, queue, size, &options.method)?;
+        let mut generator = match &options.method {
+            gi::Method::Generator(neural) => Some(Generator::new(device, queue, neural, size)?),
+            _ => None,
+        };
+        if let Some(generator) = &mut generator {
+            generator.bind(&frame, &targets, taa.as_ref().map_or(&targets.hdr, TaaPass::current))?;
+        }
         let method = options.method.name();
         let device = device.clone();
         let (lighting, previous_transforms, drawn) = (None, PreviousTransforms::default(), DrawnCount::default());
@@ -128,6 +138,7 @@ impl Renderer {
             lighting,
             method,
             indirect,
+            generator,
             passes,
             lights,
             backdrop,
@@ -145,6 +156,10 @@ impl Renderer {
             self.picture = self.passes.bind(&self.device, &self.frame, &self.targets, &mut self.taa);
             if let Some(indirect) = &mut self.indirect {
                 indirect.release_bindings();
+            }
+            if let Some(generator) = &mut self.generator {
+                let hdr = self.taa.as_ref().map_or(&self.targets.hdr, TaaPass::current);
+                generator.bind(&self.frame, &self.targets, hdr)?;
             }
         }
         Ok(())
@@ -201,7 +216,7 @@ impl Renderer {
 
     /// Returns the plan of the method's network, where one runs.
     pub fn plan(&self) -> Option<&Plan> {
-        self.indirect.as_ref()?.plan()
+        self.generator.as_ref().map(Generator::plan).or_else(|| self.indirect.as_ref()?.plan())
     }
 
     /// Width and height of the targets, pixels.
@@ -224,6 +239,9 @@ impl Renderer {
         view: &View,
         environment: [f32; 3],
     ) -> Result<Option<LayerReadback>, gi::GiError> {
+        if let Some(generator) = &self.generator {
+            return generator.read_layer(None);
+        }
         let Some(indirect) = &mut self.indirect else { return Ok(None) };
         indirect.read_input(&gi_inputs(&self.targets, view, environment, None))
     }
@@ -235,7 +253,10 @@ impl Renderer {
 
     /// Names of the network's layers; none without a network.
     pub fn layers(&self) -> Vec<&str> {
-        self.indirect.as_ref().map(|i| i.layers()).unwrap_or_default()
+        match &self.generator {
+            Some(generator) => generator.layers(),
+            None => self.indirect.as_ref().map(|i| i.layers()).unwrap_or_default(),
+        }
     }
 
     /// Returns the output of a layer of the network for the last frame, which `view` drew; `None` where there is
@@ -249,6 +270,9 @@ impl Renderer {
         environment: [f32; 3],
         layer: usize,
     ) -> Result<Option<LayerReadback>, gi::GiError> {
+        if let Some(generator) = &self.generator {
+            return generator.read_layer(Some(layer));
+        }
         let Some(indirect) = &mut self.indirect else { return Ok(None) };
         indirect.read_layer(&gi_inputs(&self.targets, view, environment, None), layer)
     }
@@ -290,7 +314,8 @@ impl Renderer {
         rows.push(("previous_transforms", self.previous_transforms.bytes()));
         rows.push(("deform", self.passes.deform.bytes()));
         rows.extend(self.taa.iter().flat_map(TaaPass::bytes));
-        rows.push((self.method, self.indirect.as_ref().map_or(0, |i| i.bytes())));
+        let painted = self.generator.as_ref().map_or(0, Generator::bytes);
+        rows.push((self.method, painted + self.indirect.as_ref().map_or(0, |i| i.bytes())));
         rows
     }
 
@@ -386,6 +411,9 @@ impl Renderer {
             None => clear(recorder, &self.targets),
         }
         self.passes.composite.record(recorder, &self.picture.composite, &lighting.sky, size);
+        if let Some(generator) = &mut self.generator {
+            generator.record(recorder);
+        }
         if let (Some(blended), Some(picture)) = (&self.passes.blended, &self.picture.blended) {
             let hdr = &self.taa.as_ref().map_or(&self.targets.hdr, TaaPass::current).view;
             let (lights, depth) = (&lighting.group, &self.targets.depth.view);

@@ -29,6 +29,7 @@ pub mod exposure;
 pub mod frame;
 #[doc(hidden)]
 pub mod gbuffer;
+mod generator;
 mod gi_inputs;
 #[doc(hidden)]
 pub mod light_choice;
@@ -64,6 +65,8 @@ pub use cull::DrawnCount;
 pub use exposure::Exposure;
 pub use frame::Purpose;
 pub use frame::{Renderer, RendererOptions};
+#[doc(hidden)]
+pub use generator::preludes as example_preludes;
 pub use light_choice::LightOptions;
 pub use targets::Targets;
 pub use view::View;

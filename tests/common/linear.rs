@@ -17,10 +17,11 @@ pub fn linear_bytes(table: &str, rows: &[FeatureRow], meaning: &str, weight: &[f
     let version = tables.iter().find(is_newest).map_or(1, |t| t.version);
     let document = format!(
         r#"{{"version": 2, "licence": "CC0-1.0", "table": {{"name": "{table}", "version": {version}}}, "inputs": [{}],
-            "cell": 4, "output": {{"tensor": "y", "meaning": "{meaning}", "channels": {outputs}}},
+            "cell": {}, "output": {{"tensor": "y", "meaning": "{meaning}", "channels": {outputs}}},
             "graph": [{{"op": "conv2d", "name": "a", "input": "input", "output": "y", "in_channels": {channels},
                 "out_channels": {outputs}, "kernel": [1, 1]}}]}}"#,
-        inputs.join(", ")
+        inputs.join(", "),
+        if table == "images" { 1 } else { 4 }
     );
     let bytes = |v: &[f32]| -> Vec<u8> { v.iter().flat_map(|x| x.to_le_bytes()).collect() };
     let shape = vec![outputs, channels as usize, 1, 1];

@@ -64,7 +64,7 @@ impl Need {
 pub fn methods() -> Vec<bouncelight::gi::Method> {
     let network = || bouncelight::net::format::Weights::shipped().map(bouncelight::gi::Neural::from);
     let method = |name: &bouncelight::gi::name::MethodName| name.method(network).expect("the shipped file is sound");
-    bouncelight::gi::name::MethodName::REAL_TIME.iter().filter_map(method).collect()
+    bouncelight::gi::name::MethodName::LIGHT.iter().filter_map(method).collect()
 }
 
 /// Says that the running test is left out, past libtest's capture, and adds a line to the file that

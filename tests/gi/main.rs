@@ -17,6 +17,7 @@ mod filter;
 mod fins;
 mod foreign;
 mod gather;
+mod generator;
 mod glow;
 mod gradient;
 mod in_flight;

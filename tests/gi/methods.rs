@@ -141,7 +141,7 @@ fn methods_are_what_the_list_says_of_them() {
         assert_eq!(name.plain().is_some() || name.needs_weights(), real_time, "{name:?} can be made");
     }
     let Some(gpu) = common::gpu() else { return };
-    for (mut method, &name) in common::methods().into_iter().zip(MethodName::REAL_TIME) {
+    for (mut method, &name) in common::methods().into_iter().zip(MethodName::LIGHT) {
         let said = (name.name(), name.needs_rays(), name.has_history());
         assert_eq!((method.name(), method.needs_rays(), method.has_history()), said);
         let takes = (method.gather_mut().is_some(), method.ambient_term_mut().is_some());

@@ -9,6 +9,11 @@ pub fn constant_filter(answer: [f32; 12]) -> Weights {
     linear("cells", CELLS_V1, "filter", &[0.0; 12 * 15], &answer)
 }
 
+/// The bytes of such a file.
+pub fn constant_filter_bytes() -> Vec<u8> {
+    linear_bytes("cells", CELLS_V1, "filter", &[0.0; 12 * 15], &[0.0; 12])
+}
+
 /// Weights of a filter that answer what chance makes of a cell, up to `most`.
 pub fn random_filter(most: f32) -> Weights {
     let mut random = Random(7);

@@ -12,7 +12,7 @@ try:
 except ImportError:
     sys.path.append(os.path.join(os.path.dirname(__file__), "..", "..", "weights-format", "python"))
 
-from bouncelight_weights import WeightsError, compact, document, read, write  # noqa: E402, F401
+from bouncelight_weights import WeightsError, compact, document, quantised, read, write  # noqa: E402, F401
 from bouncelight_weights.torch_graph import GraphNet  # noqa: E402, F401
 ODD_SIZES = [(37, 21), (5, 3), (1, 1)]
 

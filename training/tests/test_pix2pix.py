@@ -1,4 +1,4 @@
-"""The paper's recipe on small made-up pictures: published graph, pairs, both adversarial steps, kill and resume, export, the program.
+"""The paper's recipe on small made-up pictures: published graphs, views, both adversarial steps, kill and resume, export, the program.
 
     python -m unittest discover -s tests        (in training/)
 
@@ -20,7 +20,7 @@ HERE = os.path.dirname(os.path.abspath(__file__))
 sys.path[:0] = [os.path.join(HERE, ".."), os.path.join(HERE, "..", "..", "weights-format", "fixtures")]
 from bouncelight_training import filmic, stream  # noqa: E402
 from bouncelight_training.errors import TrainingError  # noqa: E402
-from bouncelight_training.pix2pix import export, model, pairs, train  # noqa: E402
+from bouncelight_training.pix2pix import examples, export, model, train, views  # noqa: E402
 from bouncelight_weights.graph import complete  # noqa: E402
 
 W, H = 32, 16
@@ -32,28 +32,29 @@ def write_exr(path, channels):
     OpenEXR.File(header, {k: np.ascontiguousarray(v, np.float32) for k, v in channels.items()}).write(path)
 
 
+def raster_of(room, seed=0):
+    """A raster EXR's channels and Cycles' picture of blocks of colour, half lit, where Cycles has a bounce that direct light misses."""
+    rng = np.random.default_rng((seed, room))
+    albedo = np.repeat(np.repeat(rng.uniform(0.2, 0.8, (2, 4, 3)), H // 2, 0), W // 4, 1)
+    lit = (np.arange(W)[None, :, None] < rng.integers(8, 24)) * np.ones((H, 1, 1))
+    direct = 0.3 * lit * albedo
+    full = direct + albedo * (stream.SKY_RADIANCE + 0.1 * direct.mean())
+    depth = np.broadcast_to(10 + np.arange(H)[:, None], (H, W))
+    rgb = lambda name, values: {f"{name}{c}": values[..., i] for i, c in enumerate("RGB")}
+    ours = rgb("", 0.9 * full) | rgb("DiffCol.", albedo) | rgb("DiffDir.", np.repeat(0.3 * lit, 3, -1)) | rgb("GlossCol.", np.full((H, W, 3), 0.04)) | rgb("GlossDir.", np.zeros((H, W, 3)))
+    ours |= rgb("Emit.", np.zeros((H, W, 3))) | {"Normal.X": -np.ones((H, W)), "Normal.Y": np.zeros((H, W)), "Normal.Z": np.zeros((H, W)), "Depth.Z": depth}
+    return ours, rgb("ViewLayer.Combined.", full)
+
+
 def write_views(folder, rooms, seed=0):
-    """Rooms of blocks of colour, half lit; Cycles' picture has a bounce that direct light misses."""
-    for kind in ("raster", "cycles"):
-        os.makedirs(os.path.join(folder, kind), exist_ok=True)
     for room in rooms:
-        rng = np.random.default_rng((seed, room))
-        albedo = np.repeat(np.repeat(rng.uniform(0.2, 0.8, (2, 4, 3)), H // 2, 0), W // 4, 1)
-        lit = (np.arange(W)[None, :, None] < rng.integers(8, 24)) * np.ones((H, 1, 1))
-        direct = 0.3 * lit * albedo
-        full = direct + albedo * (stream.SKY_RADIANCE + 0.1 * direct.mean())
-        depth = np.broadcast_to(10 + np.arange(H)[:, None], (H, W))
-        name = f"room{room:04}_view0.exr"
-        ours = {"RGB"[c]: direct[..., c] for c in range(3)} | {f"DiffCol.{'RGB'[c]}": albedo[..., c] for c in range(3)}
-        ours |= {f"GlossCol.{c}": np.full((H, W), 0.04) for c in "RGB"} | {"Normal.X": -np.ones((H, W)), "Normal.Y": np.zeros((H, W)), "Normal.Z": np.zeros((H, W))}
-        write_exr(os.path.join(folder, "raster", name), ours | {"Depth.Z": depth})
-        write_exr(os.path.join(folder, "cycles", name), {f"ViewLayer.Combined.{'RGB'[c]}": full[..., c] for c in range(3)})
-
-
-def build(folder, rooms=None, normals="clamped", name="pairs.npz"):
-    out = os.path.join(folder, name)
-    pairs.build(os.path.join(folder, "raster"), os.path.join(folder, "cycles"), out, rooms, normals)
-    return out
+        raster, cycles = (os.path.join(folder, name) for name in ("raster.exr", "cycles.exr"))
+        for path, channels in zip((raster, cycles), raster_of(room, seed)):
+            write_exr(path, channels)
+        name = f"room{room:04}"
+        pictures = views.inputs_of(raster) | {views.TARGET: views.target_of(cycles)}
+        views.write(os.path.join(folder, name + ".npz"), pictures, {"view": name, "room": room, "size": (W, H), "samples": 1, "targets": "made up"})
+    return folder
 
 
 class Published(unittest.TestCase):
@@ -81,65 +82,107 @@ class Published(unittest.TestCase):
         self.assertEqual(sum(isinstance(m, torch.nn.Conv2d) for m in patches.modules()), 5)
 
 
+    def test_deep_illumination_is_the_published_network(self):
+        import published
+        x = torch.randn(1, 12, 256, 256, generator=torch.Generator().manual_seed(0))
+        theirs, ours = published.DeepIllumination(4, "batch").eval(), model.generator(4, "batch", "deep-illumination").eval()
+        state = {}
+        for key, values in theirs.state_dict().items():
+            if key.startswith("conv") or key.startswith("deconv"):
+                state[key] = values
+        for i in range(1, 9):
+            for name, step in ((f"conv{i}", i - 1), (f"deconv{i}", 7 - i)):
+                norm = f"{name}.batch_norm"
+                if f"{norm}.weight" in ours.state_dict():
+                    state |= {f"{norm}.{k}": v for k, v in getattr(theirs, theirs.names[step]).state_dict().items() if k != "num_batches_tracked"}
+        train.load(ours, state)
+        with torch.no_grad():
+            self.assertLess((ours(x) - theirs(x)).abs().max().item(), 1e-6)
+            # Negative control: another picture.
+            self.assertGreater((ours(x.flip(-1)) - theirs(x)).abs().max().item(), 1e-3)
+
+    def test_the_gathered_generator_begins_with_what_it_is_given(self):
+        x = torch.rand(1, 15, 256, 256, generator=torch.Generator().manual_seed(0)) * 2 - 1
+        made = model.generator(4, network="gathered").eval()
+        with torch.no_grad():
+            far = (made(x) - x[:, 12:]).abs().mean().item()
+            self.assertLess(far, 0.5)
+            made.get_submodule("final.2").weight.zero_(), made.get_submodule("final.2").bias.zero_()
+            self.assertTrue(torch.equal(made(x), x[:, 12:]))
+
+
 class Toy(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
         torch.set_num_threads(1)
         cls.scratch = tempfile.TemporaryDirectory()
         cls.folder = cls.scratch.name
-        write_views(cls.folder, [2, 6, 7, 8, 9, 13])
-        cls.pairs = build(cls.folder)
+        cls.views = write_views(tempfile.mkdtemp(dir=cls.folder), [2, 6, 7, 8, 9, 13])
 
     @classmethod
     def tearDownClass(cls):
         cls.scratch.cleanup()
 
     def config(self, **more):
-        return train.Config(**{"pairs": self.pairs, "width": 2, "epochs": 5, "log_steps": 10, **more})
+        return train.Config(**{"views": self.views, "width": 2, "steps": 25, "log_steps": 10, "crop": "24x16", "learning_rate": 2e-3, "average": 0.9, **more})
 
     def run_in(self, name, config=None, **more):
         return train.train(config or self.config(), os.path.join(self.folder, name), **more)
 
-    def test_pairs(self):
-        data = pairs.Pairs(self.pairs)
-        self.assertEqual((data.pictures.shape, data.target.shape), ((6, 4, H, W, 3), (6, H, W, 3)))
-        depth, direct, diffuse, normal = data.pictures[1]
-        np.testing.assert_array_equal(depth[0], filmic.shown(np.zeros((W, 3))))
-        np.testing.assert_array_equal(depth[-1], filmic.shown(np.ones((W, 3))))
-        # Lit by the sky where the sun does not reach, and never darker than nothing.
-        self.assertGreater(int(direct.min()), 0)
-        # A wall that faces -X: lost by clamping, kept by halving.
-        self.assertEqual(int(normal.max()), 0)
-        halved = pairs.Pairs(build(self.folder, {6}, "halved", "halved.npz"))
-        self.assertEqual(halved.pictures[0, 3, 0, 0].tolist(), [0, 128, 128])
-        four, target = data.tensors(1)
+    def test_views(self):
+        data = examples.Examples(self.views, "pix2pix", 5)
+        pictures = data.pictures[1]
+        self.assertEqual(pictures["depth"][0, :, 0].tolist(), filmic.shown(np.zeros((W, 3)))[:, 0].tolist())
+        self.assertEqual(pictures["depth"][-1, :, 0].tolist(), filmic.shown(np.ones((W, 3)))[:, 0].tolist())
+        # Lit by the sky where the sun does not reach, and never darker than nothing; the file's picture is brighter there.
+        self.assertGreater(int(pictures["direct"].min()), 0)
+        raster, cycles = raster_of(6)
+        light = np.stack([raster[f"DiffDir.{c}"] * raster[f"DiffCol.{c}"] for c in "RGB"], -1)
+        sky = stream.SKY_RADIANCE * np.stack([raster[f"DiffCol.{c}"] + raster[f"GlossCol.{c}"] for c in "RGB"], -1)
+        np.testing.assert_allclose(pictures["direct"].astype(int), filmic.shown(light + sky).astype(int), atol=1)
+        np.testing.assert_allclose(pictures["gathered"].astype(int), filmic.shown(np.stack([raster[c] for c in "RGB"], -1)).astype(int), atol=1)
+        # A wall that faces -X is lost by clamping.
+        self.assertEqual(int(pictures["normal"].max()), 0)
+        four, target = data.example(1)
         self.assertEqual((four.shape, target.shape), ((1, 12, H, W), (1, 3, H, W)))
-        np.testing.assert_allclose(four[0, 3:6, 2, 5], direct[2, 5] / 127.5 - 1, atol=1e-6)
-        parts = [set(map(int, data.room[part])) for part in data.split(1)]
-        self.assertEqual(set.union(*parts), {2, 6, 7, 8, 9, 13})
-        self.assertEqual(sum(map(len, parts)), 6)
-        self.assertIn(2, parts[1])
+        np.testing.assert_allclose(four[0, 3:6, 2, 5], pictures["direct"][2, 5] / 127.5 - 1, atol=1e-6)
+        # A window, and another order of colours: of light and albedo, not of depth and normals.
+        part, _ = data.example(1, (slice(2, 10), slice(4, 20)), (2, 0, 1))
+        np.testing.assert_array_equal(part[0, 3:6], four[0, [5, 3, 4], 2:10, 4:20])
+        np.testing.assert_array_equal(part[0, 9:12], four[0, 9:12, 2:10, 4:20])
+        self.assertEqual(examples.Examples(self.views, "gathered", 5).example(1)[0].shape[1], 15)
+        stretched, _ = examples.Examples(self.views, "deep-illumination", 5).example(1)
+        self.assertEqual((stretched[0, 3:6].min(), stretched[0, 3:6].max()), (-1, 1))
+        # Room 2 validates, and every fifth; no view does both.
+        self.assertEqual((sorted(data.validation), sorted(data.train)), ([0, 4], [1, 2, 3, 5]))
 
     def test_refuses(self):
         folder = tempfile.mkdtemp(dir=self.folder)
-        write_views(folder, [33, 2201])
+        write_views(folder, [33])
+        with self.assertRaisesRegex(TrainingError, "room 33 is kept for judging"):
+            examples.Examples(folder, "pix2pix", 5)
         with self.assertRaisesRegex(TrainingError, r"\[33, 2201\] are kept for judging"):
-            build(folder)
-        write_exr(os.path.join(folder, "cycles", "room0033_view0.exr"), {"Y": np.zeros((H, W))})
-        with self.assertRaisesRegex(TrainingError, "no channel Combined.R"):
-            pairs.target_of(os.path.join(folder, "cycles", "room0033_view0.exr"))
-        with self.assertRaisesRegex(TrainingError, "not readable.*pix2pix.pairs"):
-            pairs.Pairs(os.path.join(folder, "none.npz"))
+            views.main.__wrapped__([folder, "--rooms", "6,33,2201"])
+        with self.assertRaisesRegex(TrainingError, "either --rooms or --scene"):
+            views.main.__wrapped__([folder])
+        write_exr(os.path.join(folder, "cycles.exr"), {"Y": np.zeros((H, W))})
+        with self.assertRaisesRegex(TrainingError, "no channel"):
+            views.target_of(os.path.join(folder, "cycles.exr"))
+        with self.assertRaisesRegex(TrainingError, "no views.*pix2pix.views"):
+            examples.Examples(os.path.join(folder, "none"), "pix2pix", 5)
+        with open(os.path.join(folder, "room0006.npz"), "wb") as file:
+            file.write(b"half a file")
+        with self.assertRaisesRegex(TrainingError, "room0006.npz: not a view.*pix2pix.views"):
+            examples.Examples(folder, "pix2pix", 5)
 
     def test_only_the_described_step_has_an_adversarial_gradient(self):
         gradients = {}
         for adversarial in train.ADVERSARIAL:
             for l1 in (0.0, 100.0):
-                run = train.Run(self.config(adversarial=adversarial, l1=l1), self.folder, pairs.Pairs(self.pairs))
+                config = self.config(adversarial=adversarial, l1=l1)
+                run = train.Run(config, self.folder, examples.Examples(self.views, "pix2pix", 5))
                 torch.manual_seed(1)
-                four, target = run.on_device(int(run.train[0]))
-                loss = run.losses(four, target)[2]
-                loss.backward()
+                run.losses(*run.example()[1:])[2].backward()
                 gradients[adversarial, l1] = run.generator.get_submodule("final.2").weight.grad.norm().item()
         self.assertEqual(gradients["published", 0.0], 0.0)
         self.assertGreater(gradients["described", 0.0], 1e-6)
@@ -149,17 +192,17 @@ class Toy(unittest.TestCase):
         for adversarial in train.ADVERSARIAL:
             config = self.config(adversarial=adversarial)
             whole = self.run_in(f"whole-{adversarial}", config)
-            steps = 5 * len(whole.train)
-            self.assertEqual(whole.step, steps)
+            self.assertEqual(whole.step, 25)
             self.assertLess(whole.rows[-1]["validation_l1"], whole.rows[0]["validation_l1"])
             # Stopped with a save at step 7, then killed without one.
             name = f"killed-{adversarial}"
             self.run_in(name, config, stop_after=7).save()
             self.run_in(name, config, stop_after=2)
             again = self.run_in(name, config)
-            for part in ("generator", "discriminator"):
-                for key, values in getattr(whole, part).state_dict().items():
-                    self.assertTrue(torch.equal(values, getattr(again, part).state_dict()[key]), key)
+            self.assertEqual("discriminator" in whole.networks, adversarial == "described")
+            for part, network in whole.networks.items():
+                for key, values in network.state_dict().items():
+                    self.assertTrue(torch.equal(values, again.networks[part].state_dict()[key]), key)
         other = self.run_in("other", self.config(seed=2))
         self.assertFalse(torch.equal(whole.generator.state_dict()["final.2.weight"], other.generator.state_dict()["final.2.weight"]))
         with self.assertRaisesRegex(TrainingError, "another seed"):
@@ -167,19 +210,22 @@ class Toy(unittest.TestCase):
         for name in ("config.json", "log.csv", "loss.png", "validation.png"):
             self.assertTrue(os.path.getsize(os.path.join(self.folder, "whole-published", name)), name)
         run, out = os.path.join(self.folder, "whole-published"), os.path.join(self.folder, "toy.safetensors")
-        for half in (False, True):
-            told = export.export(run, out, half=half)
-            self.assertAlmostEqual(told["validation_l1"], told["of_file"]["validation_l1"], delta=1e-2 if half else 1e-6)
+        sizes = []
+        for stored, delta in (("f32", 1e-6), ("f16", 1e-2), ("i8", 1e-2)):
+            told = export.export(run, out, stored=stored)
+            self.assertAlmostEqual(told["validation_l1"], told["of_file"]["validation_l1"], delta=delta)
+            sizes.append(told["bytes"])
+        self.assertEqual(sizes, sorted(sizes, reverse=True))
         with open(os.path.join(self.folder, "toy.json")) as file:
             about = json.load(file)
-        self.assertEqual(about["samples_seen"], steps)
+        self.assertEqual(about["samples_seen"], 25)
         self.assertNotIn(self.folder, json.dumps(about))
         wrong = export.generator_of(export.read_checkpoint(os.path.join(self.folder, "other", "checkpoint.pt")))
         with self.assertRaisesRegex(TrainingError, "not what was trained"):
             export.verify(out, wrong, 1e-6, [torch.randn(1, 12, H, W)])
 
     def test_not_finite_stops(self):
-        with self.assertRaisesRegex(TrainingError, r"generator's loss is nan at step \d+ \(room \d+ view 0\)"):
+        with self.assertRaisesRegex(TrainingError, r"generator's loss is nan at step \d+ \(room\d+\)"):
             self.run_in("exploded", self.config(l1=float("nan")))
 
     @unittest.skipUnless(PROGRAM, "SKIP: BOUNCELIGHT does not name the program")
@@ -187,18 +233,19 @@ class Toy(unittest.TestCase):
         self.run_in("short", self.config(width=4), stop_after=10).save()
         run = os.path.join(self.folder, "short")
         out, state, converted = (os.path.join(self.folder, n) for n in ("short.safetensors", "state.safetensors", "converted.safetensors"))
-        export.export(run, out, half=True, state_path=state)
-        data = pairs.Pairs(self.pairs)
+        export.export(run, out, stored="f16", state_path=state)
+        data = examples.Examples(self.views, "pix2pix", 5)
         flags = []
-        for name, picture in zip(model.PICTURES, data.pictures[1]):
+        for name in model.PICTURES:
             path = os.path.join(self.folder, f"{name}.png")
-            Image.fromarray(picture).save(path)
+            picture = data.pictures[1][name]
+            Image.fromarray(np.repeat(picture, 3, -1) if name == "depth" else picture).save(path)
             flags += [f"--{name}", path]
         subprocess.run([PROGRAM, "weights", "convert", state, "--arch", "pix2pix", "--norm", "group", "--dtype", "f16", "-o", converted], check=True, capture_output=True)
         documents = [export.read(path)[1] for path in (out, converted)]
         for field in ("graph", "inputs", "output", "cell", "table"):
             self.assertEqual(*[complete(d["graph"]) if field == "graph" else d[field] for d in documents])
-        four = torch.from_numpy(data.tensors(1)[0])
+        four = torch.from_numpy(data.example(1)[0])
         with torch.no_grad():
             expected = train.as_shown(export.generator_of(export.read_checkpoint(os.path.join(run, "checkpoint.pt"))).padded(four)).astype(int)
         made = os.path.join(self.folder, "made.png")
@@ -208,6 +255,32 @@ class Toy(unittest.TestCase):
         # Negative control: dropout makes another picture.
         subprocess.run([PROGRAM, "apply", *flags, "--weights", out, "-o", made, "-q", "--dropout", "1"], check=True, capture_output=True)
         self.assertGreater(np.abs(np.asarray(Image.open(made)).astype(int) - expected).max(), 1)
+
+
+    @unittest.skipUnless(PROGRAM, "SKIP: BOUNCELIGHT does not name the program")
+    def test_frames_are_given_what_views_hold(self):
+        """`render` makes the pictures on the GPU, `views` from layers of a file; the same network paints the same picture of both."""
+        at = lambda name: os.path.join(self.folder, name)
+        scene = ["paper-room:6", "--size", "96x64", "--environment", "0.05"]
+        for network in ("pix2pix", "gathered"):
+            self.run_in(f"short-{network}", self.config(width=4, network=network), stop_after=5).save()
+            export.export(at(f"short-{network}"), at("net.safetensors"))
+            method = ["--method", "generator-gather" if network == "gathered" else "generator", "--weights", at("net.safetensors")]
+            more = ["--samples", "1", "-q"]
+            drawn = method + (["--accumulate", "1"] if network == "gathered" else [])
+            layers = "DiffDir,DiffCol,GlossDir,GlossCol,Emit,Normal,Depth"
+            subprocess.run([PROGRAM, "render", *scene, "--method", "gather", "--accumulate", "1", *more, "--aov", layers, "-o", at("layers.exr")], check=True, capture_output=True)
+            subprocess.run([PROGRAM, "render", *scene, *drawn, *more, "--precision", "f32", "--exposure", "0", "-o", at("drawn.png")], check=True, capture_output=True)
+            pictures = views.inputs_of(at("layers.exr"), 0.05)
+            x = np.concatenate([examples.encoded(pictures[name], "signed").transpose(2, 0, 1) for name in model.NETWORKS[network][0]])[None]
+            with torch.no_grad():
+                expected = train.as_shown(export.generator_of(export.read_checkpoint(at(f"short-{network}/checkpoint.pt"))).padded(torch.from_numpy(x))).astype(int)
+            surface = views.layers(at("layers.exr"))["Depth.Z"] < views.FARTHEST
+            off = np.abs(np.asarray(Image.open(at("drawn.png")).convert("RGB")).astype(int) - expected)[surface]
+            self.assertLess(off.mean(), 0.6, network)
+            self.assertLess(np.percentile(off, 99), 4, network)
+            # Negative control: the picture moved by a pixel is another.
+            self.assertGreater(np.abs(np.roll(expected, 3, 1) - expected)[surface].mean(), 0.6, network)
 
 
 class Filmic(unittest.TestCase):

@@ -30,6 +30,10 @@ pub enum Method {
     Gather(gather::Options),
     /// `gather`, whose filter a network guides, see [`neural`]; `weights.into()` runs it with defaults.
     Neural(Box<Neural>),
+    /// The paper's generator, or one that is given the light of `gather`, too: a network that paints the
+    /// picture. Only a [`Renderer`](crate::render::Renderer) paints; a [`View`](crate::gi::View) finds the
+    /// light beneath: none, or that of `gather`.
+    Generator(Box<Neural>),
     /// A host's own.
     Custom(Custom),
 }
@@ -48,15 +52,32 @@ pub enum MethodName {
     Gather,
     /// `gather` with a network.
     Neural,
+    /// The paper's generator.
+    Generator,
+    /// A generator that is given `gather`'s light as well.
+    #[serde(rename = "generator-gather")]
+    GeneratorGather,
     /// The path tracer.
     Reference,
 }
 
 impl MethodName {
     /// All of them, cheapest first, the truth last.
-    pub const ALL: &[Self] = &[Self::Direct, Self::Ambient, Self::Ssgi, Self::Gather, Self::Neural, Self::Reference];
+    pub const ALL: &[Self] = &[
+        Self::Direct,
+        Self::Ambient,
+        Self::Ssgi,
+        Self::Gather,
+        Self::Neural,
+        Self::Generator,
+        Self::GeneratorGather,
+        Self::Reference,
+    ];
 
-    /// All real-time methods, cheapest first.
+    /// All real-time methods that find light, cheapest first: what is added scales with the light.
+    pub const LIGHT: &[Self] = Self::ALL.split_at(Self::Generator as usize).0;
+
+    /// All real-time methods: those, and generators, which paint.
     pub const REAL_TIME: &[Self] = Self::ALL.split_at(Self::Reference as usize).0;
 
     pub(super) fn facts(self) -> Facts {
@@ -116,6 +137,24 @@ impl MethodName {
                 preludes: neural::preludes,
                 ..Facts::NONE
             },
+            Self::Generator => Facts {
+                name: "generator",
+                title: "Generator (Pix2Pix)",
+                sentence: "The paper's network paints the picture from direct light, depth, normals and albedo",
+                with: Some(|neural| Method::Generator(Box::new(neural))),
+                ..Facts::NONE
+            },
+            Self::GeneratorGather => Facts {
+                name: "generator-gather",
+                title: "Gather + generator",
+                sentence: "The same, given the picture with the light of gather as well",
+                with: Some(|neural| Method::Generator(Box::new(neural))),
+                numbers: Some(Numbers::Gather),
+                needs_rays: true,
+                has_history: true,
+                writes_specular: true,
+                ..Facts::NONE
+            },
             Self::Reference => Facts {
                 name: "reference",
                 title: "Path-traced reference",
@@ -138,6 +177,8 @@ impl Method {
             Method::Ssgi(_) => MethodName::Ssgi,
             Method::Gather(_) => MethodName::Gather,
             Method::Neural(_) => MethodName::Neural,
+            Method::Generator(neural) if neural.is_given_gathered() => MethodName::GeneratorGather,
+            Method::Generator(_) => MethodName::Generator,
             Method::Custom(custom) => return Err(custom),
         })
     }
@@ -163,6 +204,11 @@ impl Method {
                 GatherGi::check(&device.limits(), size, &neural.gather)?;
                 Box::new(FilterGi::new(device, queue, neural, size)?)
             }
+            Method::Generator(neural) if neural.is_given_gathered() => {
+                GatherGi::check(&device.limits(), size, &neural.gather)?;
+                Box::new(GatherGi::new(device, size, neural.gather))
+            }
+            Method::Generator(_) => return Ok(None),
             Method::Custom(custom) => (custom.make)(device, queue, size)?,
         }))
     }

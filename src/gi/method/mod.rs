@@ -154,7 +154,7 @@ impl Method {
     pub fn gather_mut(&mut self) -> Option<&mut gather::Options> {
         match self {
             Method::Gather(options) => Some(options),
-            Method::Neural(neural) => Some(&mut neural.gather),
+            Method::Neural(neural) | Method::Generator(neural) => Some(&mut neural.gather),
             _ => None,
         }
     }

@@ -43,6 +43,11 @@ impl MethodName {
         self.facts().writes_specular
     }
 
+    /// Whether it paints the picture instead of finding light.
+    pub fn paints(self) -> bool {
+        matches!(self, Self::Generator | Self::GeneratorGather)
+    }
+
     /// Whether it needs a network's weights.
     pub fn needs_weights(self) -> bool {
         self.facts().with.is_some()

@@ -6,7 +6,7 @@ use crate::net::gpu::{self, Tuned};
 use crate::net::plan::Precision;
 use std::sync::Arc;
 
-/// A network as a method: its weights, and how it runs. `weights.into()` has the defaults.
+/// A network as a method (a filter's or a generator's): its weights, and how it runs. `weights.into()` has the defaults.
 #[derive(Debug, Clone)]
 pub struct Neural {
     /// The weights.
@@ -17,7 +17,7 @@ pub struct Neural {
     /// Kernels that a tuner found fastest on this device. Default: none; the choice is then by
     /// counted loads.
     pub tuned: Arc<Tuned>,
-    /// Options of the `gather` whose filter the network guides.
+    /// Options of the `gather` whose filter the network guides, or whose light it is given.
     pub gather: gather::Options,
 }
 
@@ -29,7 +29,15 @@ impl From<Weights> for Neural {
     }
 }
 
+/// The feature of generators that needs the light of `gather`.
+const GATHERED: &str = "gathered";
+
 impl Neural {
+    /// Whether a generator of these weights is given the picture with the light of `gather`.
+    pub fn is_given_gathered(&self) -> bool {
+        self.weights.inputs.iter().any(|feature| feature.name == GATHERED)
+    }
+
     /// The same with its numbers stored as `precision` says, where it says something.
     pub fn stored(mut self, precision: Option<Precision>) -> Self {
         self.network.precision = precision.unwrap_or(self.network.precision);

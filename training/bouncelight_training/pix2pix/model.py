@@ -1,17 +1,21 @@
 """The published networks as lists of operators and modules, of any base width.
 
-The generator's operators carry the published code's module names, so its `state_dict()` has the published keys and
-`bouncelight weights convert --arch pix2pix` takes it; the graph is the one that this conversion makes. The discriminator is
-PatchGAN's: four halving blocks and one answer for each patch.
+The generators' operators carry the published codes' module names; the graphs are those that `bouncelight weights convert` makes of
+published weights, and the Pix2Pix generator's `state_dict()` has the published keys. `gathered` is ours: the Pix2Pix generator given the picture with
+the light of `gather` as well, which also goes around it, so that it paints what is to be changed. The discriminator is PatchGAN's:
+four halving blocks and one answer for each patch.
 """
 import torch
 from torch import nn
 
 from ..errors import TrainingError
 from ..weights import GraphNet
-from .pairs import PICTURES  # noqa: F401
+from .views import GATHERED, PICTURES
 
 INPUTS, OUTPUTS, LEAK, GROUPS, EPS = 12, 3, 0.2, 2, 1e-5
+# Pictures, in the order in which each takes them, and how they are written in weights files.
+NETWORKS = {"pix2pix": (PICTURES, "signed"), "gathered": ((*PICTURES, GATHERED), "signed"), "deep-illumination": (("diffuse", "direct", "normal", "depth"), "signed_stretched")}
+AROUND = "around"
 NORMS = ("group", "instance", "batch")
 # In down4 to down8 and up1 to up4.
 DROPOUT = 0.5
@@ -34,22 +38,39 @@ def _conv(kind, name, source, output, channels, **more):
             "output": output, **more}
 
 
-def generator_graph(width, norm="group"):
-    """The generator's operators and its output's name."""
+def _halvings(norm, graph, name, source, channels, out, last, steps):
+    """A convolution that halves the picture; `steps`: its norm's name or None, its activation, its dropout's name or None."""
+    normed, activation, dropout = steps
+    module = name.removesuffix(".0")
+    own = f"{module}.normed" if dropout else last
+    graph.append(_conv("conv2d", name, source, f"{module}.conv" if normed else own, (channels, out[0]), stride=2, bias=out[1], **({} if normed else {"activation": activation})))
+    if normed:
+        graph.append(_norm(norm, normed, f"{module}.conv", own, out[0], activation))
+    if dropout:
+        graph.append({"op": "dropout", "name": dropout, "input": own, "p": DROPOUT, "output": last})
+
+
+def generator_graph(width, norm="group", network="pix2pix"):
+    """A generator's operators and its output's name."""
     if norm not in NORMS:
         raise TrainingError(f"no such norm: {norm}; there are {', '.join(NORMS)}")
-    leaky, graph, source, channels = {"leaky_relu": LEAK}, [], "input", INPUTS
+    if network not in NETWORKS:
+        raise TrainingError(f"no such network: {network}; there are {', '.join(NETWORKS)}")
+    make = _deep_illumination if network == "deep-illumination" else _pix2pix
+    graph = make(width, norm, 3 * len(NETWORKS[network][0]))
+    if network == "gathered":
+        graph.insert(-1, {"op": "conv2d", "name": AROUND, "input": "input", "in_channels": 15, "out_channels": OUTPUTS, "kernel": [1, 1], "bias": True, "output": "gathered.picture"})
+        graph[-1] |= {"add": "gathered.picture", "add_at": "after_activation"}
+    return graph, "y"
+
+
+def _pix2pix(width, norm, channels):
+    leaky, graph, source = {"leaky_relu": LEAK}, [], "input"
     for i in range(1, 9):
-        module, out, last = f"down{i}.model", width * multiple(i), f"d{i}"
-        normed = f"{module}.normed" if i >= 4 else last
-        if i in (1, 8):
-            graph.append(_conv("conv2d", f"{module}.0", source, normed, (channels, out), stride=2, bias=False, activation=leaky))
-        else:
-            graph.append(_conv("conv2d", f"{module}.0", source, f"{module}.conv", (channels, out), stride=2, bias=False))
-            graph.append(_norm(norm, f"{module}.1", f"{module}.conv", normed, out, leaky))
-        if i >= 4:
-            graph.append({"op": "dropout", "name": f"{module}.{2 if i == 8 else 3}", "input": normed, "p": DROPOUT, "output": last})
-        source, channels = last, out
+        module, out = f"down{i}.model", width * multiple(i)
+        dropout = f"{module}.{2 if i == 8 else 3}" if i >= 4 else None
+        _halvings(norm, graph, f"{module}.0", source, channels, (out, False), f"d{i}", (None if i in (1, 8) else f"{module}.1", leaky, dropout))
+        source, channels = f"d{i}", out
     for i in range(1, 8):
         module, out, own = f"up{i}.model", width * multiple(8 - i), f"up{i}.model.normed"
         graph.append(_conv("conv_transpose2d", f"{module}.0", source, f"{module}.conv", (channels, out), stride=2, output_padding=0, bias=False))
@@ -62,7 +83,28 @@ def generator_graph(width, norm="group"):
     graph.append({"op": "upsample_nearest", "name": "final.0", "input": source, "scale": 2, "output": "final.up"})
     graph.append({"op": "pad", "name": "final.1", "input": "final.up", "padding": [1, 1, 0, 0], "output": "final.pad"})
     graph.append(_conv("conv2d", "final.2", "final.pad", "y", (channels, OUTPUTS), stride=1, bias=True, activation="tanh"))
-    return graph, "y"
+    return graph
+
+
+def _deep_illumination(width, norm, channels):
+    """Thomas and Forbes 2018, each layer with a norm of its own (theirs shares one between layers of equal width)."""
+    leaky, graph, source = {"leaky_relu": LEAK}, [], "input"
+    for i in range(1, 9):
+        out, last = width * multiple(i), f"encoder{i}"
+        _halvings(norm, graph, f"conv{i}", source, channels, (out, True), last, (None if i in (1, 8) else f"conv{i}.batch_norm", "relu" if i == 8 else leaky, None))
+        source, channels = last, out
+    for i in range(1, 8):
+        name, out, own = f"deconv{i}", width * multiple(8 - i), f"deconv{i}.normed"
+        graph.append(_conv("conv_transpose2d", name, source, f"{name}.conv", (channels, out), stride=2, output_padding=0, bias=True))
+        graph.append(_norm(norm, f"{name}.batch_norm", f"{name}.conv", own, out, "none"))
+        if i <= 3:
+            graph.append({"op": "dropout", "name": f"{name}.dropout", "input": own, "p": DROPOUT, "output": f"{name}.dropped"})
+            own = f"{name}.dropped"
+        graph.append({"op": "concat", "name": f"{name}.cat", "inputs": [own, f"encoder{8 - i}"], "output": f"{name}.joined"})
+        graph.append({"op": "activation", "name": f"{name}.relu", "input": f"{name}.joined", "activation": "relu", "output": f"decoder{i}"})
+        source, channels = f"decoder{i}", 2 * out
+    graph.append(_conv("conv_transpose2d", "deconv8", source, "y", (channels, OUTPUTS), stride=2, output_padding=0, bias=True, activation="tanh"))
+    return graph
 
 
 def first_numbers(module):
@@ -76,9 +118,17 @@ def first_numbers(module):
     return module
 
 
-def generator(width, norm="group"):
-    """[n,12,h,w] pictures in [-1, 1] (depth, direct, diffuse, normal) to [n,3,h,w]; `padded` takes any h and w."""
-    return first_numbers(GraphNet(*generator_graph(width, norm)))
+def generator(width, norm="group", network="pix2pix"):
+    """[n,c,h,w] pictures in [-1, 1], in the order of NETWORKS, to [n,3,h,w]; `padded` takes any h and w."""
+    made = first_numbers(GraphNet(*generator_graph(width, norm, network)))
+    if network == "gathered":
+        # It begins with the picture that it is given.
+        around = made.get_submodule(AROUND)
+        with torch.no_grad():
+            around.weight.zero_()
+            around.bias.zero_()
+            around.weight[:, -OUTPUTS:, 0, 0] = torch.eye(OUTPUTS)
+    return made
 
 
 class Discriminator(nn.Module):

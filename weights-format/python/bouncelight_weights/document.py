@@ -27,7 +27,7 @@ CELLS_V1 = {
     "frames": (1, ("inverse_root",)), "lately": (1, ("difference_over_sum",)), "nearness": (1, ("twice_width_over_length",)),
     "depth": (1, ("log_over_mean",)), "normal": (3, ("gravity_frame",)), "hit": (1, ("flag",)), "towards": (3, ("gravity_frame",)),
 }
-IMAGES_V1 = {name: (3, _PICTURE) for name in ("depth", "direct", "diffuse", "normal")}
+IMAGES_V1 = {name: (3, _PICTURE) for name in ("depth", "direct", "diffuse", "normal", "gathered")}
 # Table: (features, whether a network uses them in the table's order).
 TABLES = {"cells": (CELLS_V2, True), "images": (IMAGES_V1, False), "free": ({}, False)}
 # Newest version of each, where it is not 1, and the features of older ones.

@@ -11,7 +11,7 @@ use bouncelight::net::{
 };
 use bouncelight_lab::network::{
     cpu::{self, Tensor},
-    pictures,
+    pictures, shipped,
 };
 use bouncelight_scene::image_io::{self, Image};
 use std::io::Read;
@@ -37,7 +37,11 @@ pub struct Args {
     /// Albedo, of the same size.
     #[arg(long, value_name = "PNG")]
     diffuse: PathBuf,
-    /// Weights of a network on pictures, from `weights convert`.
+    /// Direct light and that of method gather, of the same size, for networks that want it.
+    #[arg(long, value_name = "PNG")]
+    gathered: Option<PathBuf>,
+    /// Weights of a network on pictures, from `weights convert` or training; `generator`, `generator-gather`: those that come
+    /// with the program.
     #[arg(long, value_name = "FILE")]
     weights: PathBuf,
     /// Picture to write; `-`: standard output.
@@ -51,7 +55,7 @@ pub struct Args {
 /// Examples at the end of the help.
 pub const EXAMPLES: &str = r"Examples:
   bouncelight apply --direct direct.png --depth depth.png --normal normal.png --diffuse albedo.png \
-    --weights net.safetensors -o out.png
+    --weights generator -o out.png
   bouncelight apply --direct direct.png --depth depth.png --normal normal.png --diffuse albedo.png \
     --weights net.safetensors -o out.png --dropout 1
   bouncelight apply --direct direct.png --depth depth.png --normal normal.png --diffuse albedo.png \
@@ -63,12 +67,14 @@ pub fn run(global: &Global, args: Args) -> Result<()> {
         return Err(usage(format!("{name}: the picture's name must end in .png")));
     }
     image_io::check_writable(&args.output)?;
-    let weights = Weights::load(&args.weights)?;
+    let weights = shipped::find(&args.weights)?;
     pictures::check(&weights)?;
     let [depth, direct, diffuse, normal] = [&args.depth, &args.direct, &args.diffuse, &args.normal].map(|p| rgb(p));
     let (depth, direct, diffuse, normal) = (depth?, direct?, diffuse?, normal?);
+    let gathered = args.gathered.as_deref().map(rgb).transpose()?;
     let size = [direct.width, direct.height];
-    for (image, path) in [(&depth, &args.depth), (&diffuse, &args.diffuse), (&normal, &args.normal)] {
+    let others = [(&depth, &args.depth), (&diffuse, &args.diffuse), (&normal, &args.normal)];
+    for (image, path) in others.into_iter().chain(gathered.iter().zip(&args.gathered)) {
         if [image.width, image.height] != size {
             let sizes = format!(
                 "{}x{} pixels, {} has {}x{}",
@@ -78,7 +84,7 @@ pub fn run(global: &Global, args: Args) -> Result<()> {
                 size[0],
                 size[1]
             );
-            return Err(usage(format!("{} has {sizes}; all four pictures need one size", path.display())));
+            return Err(usage(format!("{} has {sizes}; all pictures need one size", path.display())));
         }
     }
     let input = pictures::input(
@@ -89,6 +95,7 @@ pub fn run(global: &Global, args: Args) -> Result<()> {
             direct: &direct.pixels,
             diffuse: &diffuse.pixels,
             normal: &normal.pixels,
+            gathered: gathered.as_ref().map(|image| image.pixels.as_slice()),
         },
     )?;
     let output = network(global, &weights, &input, &args)?;

@@ -7,6 +7,7 @@ use bouncelight::gi::{Method, Neural};
 use bouncelight::gpu::{Backend, Gpu, GpuOptions};
 use bouncelight::gpu_scene::TextureMemory;
 use bouncelight::net::{format::Weights, plan::Precision};
+use bouncelight_lab::network::shipped;
 use bouncelight_scene::LoadOptions;
 use bouncelight_scene::units::{Units, Up};
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
@@ -197,12 +198,24 @@ impl TypedValueParser for MethodParser {
 /// The real-time method called `name` with its weights: `weights`, or the shipped ones. `tuned` adds
 /// what a device is needed for.
 pub fn real_time(name: MethodName, global: &Global, weights: Option<&PathBuf>) -> Result<Method> {
-    let method = name.method(|| load_weights(weights).map(|w| Neural::from(w).stored(global.precision())))?;
+    let method = name.method(|| weights_of(name, weights).map(|w| Neural::from(w).stored(global.precision())))?;
     method.ok_or_else(|| usage(format!("`{}` is not a real-time method", name.name())))
 }
 
-/// The weights in `path`, or the shipped ones of that name; without a path those shipped as the
-/// default.
+/// The weights in `path`, which must be of the kind that `method` runs; without a path those that come with
+/// the program.
+fn weights_of(method: MethodName, path: Option<&PathBuf>) -> Result<Weights> {
+    let Some(path) = path else { return Ok(shipped::of(method)?) };
+    let weights = shipped::find(path)?;
+    if shipped::fits(method, &weights) {
+        return Ok(weights);
+    }
+    let (is, wants) = if method.paints() { ("a filter's", "generator's") } else { ("a generator's", "filter's") };
+    let name = method.name();
+    Err(usage(format!("{}: these weights are {is}, method `{name}` wants a {wants}", path.display())))
+}
+
+/// The weights in `path`, or the shipped ones of that name; without a path the shipped filter.
 pub fn load_weights(path: Option<&PathBuf>) -> Result<Weights> {
     Ok(Weights::find(path.map(PathBuf::as_path))?)
 }

@@ -74,7 +74,7 @@ struct Methods(Vec<MethodName>);
 
 fn parse_methods(text: &str) -> Result<Methods, String> {
     match text {
-        "all" => Ok(Methods(MethodName::REAL_TIME.to_vec())),
+        "all" => Ok(Methods(MethodName::LIGHT.to_vec())),
         "reference" => Err("bench measures frames of real-time methods; `bouncelight trace` tells its speed".into()),
         one if replaced(one).is_some() => Err(replaced(one).unwrap_or_default()),
         one => match MethodName::from_name(one) {
@@ -129,7 +129,7 @@ pub fn run(global: &Global, args: Args) -> Result<()> {
     let fitted = fitted.map(|f| super::fitted::fresh(f, &scene)).transpose()?.flatten();
     let gpu = global.open_gpu()?;
     let mut uploaded = SceneGpu::new(&gpu.device, &gpu.queue, &scene)?;
-    let all = || args.method.as_ref().map_or(MethodName::REAL_TIME.to_vec(), |m| m.0.clone());
+    let all = || args.method.as_ref().map_or(MethodName::LIGHT.to_vec(), |m| m.0.clone());
     let names = fitted.as_ref().map_or_else(all, |f| vec![f.method]);
     if let (Some(f), false) = (&fitted, global.quiet) {
         eprintln!("method `{}`, as fitted to {}; --method all measures all", f.method.name(), args.scene.scene);

@@ -10,8 +10,7 @@ use super::{
 };
 use anyhow::{Context, Result};
 use bouncelight::gi::{Method, gather};
-use bouncelight::net::format::Weights;
-use bouncelight_lab::network::pictures;
+use bouncelight_lab::network::shipped;
 use bouncelight_lab::study::{
     bench::BenchOptions,
     chart::{
@@ -191,7 +190,7 @@ pub fn run(global: &Global, args: Args) -> Result<()> {
 fn entries(global: &Global, args: &Args) -> Result<Vec<Entry>> {
     let mut names: Vec<MethodName> = Vec::new();
     for name in &args.methods {
-        let more = name.map_or(MethodName::REAL_TIME.to_vec(), |n| vec![n]);
+        let more = name.map_or(MethodName::LIGHT.to_vec(), |n| vec![n]);
         names.extend(more);
     }
     let mut entries = Vec::new();
@@ -204,22 +203,18 @@ fn entries(global: &Global, args: &Args) -> Result<Vec<Entry>> {
         entries.push(Entry::Method { name, method: Method::Gather(*options) });
     }
     for path in &args.weights {
-        let weights = Weights::find(Some(path))?;
+        let paints = shipped::fits(MethodName::Generator, &shipped::find(path)?);
+        let method = if paints { MethodName::Generator } else { MethodName::Neural };
         let stem = path.file_stem().map_or_else(String::new, |s| s.to_string_lossy().into_owned());
-        if weights.table.name == "images" {
-            pictures::check(&weights)?;
-            entries.push(Entry::Pictures { name: format!("{stem} on pictures"), weights: Box::new(weights) });
-        } else {
-            let method = real_time(MethodName::Neural, global, Some(path))?;
-            entries.push(Entry::Method { name: format!("neural {stem}"), method });
-        }
+        let name = format!("{} {stem}", method.name());
+        entries.push(Entry::Method { name, method: real_time(method, global, Some(path))? });
     }
     if args.no_caustics {
         for entry in &mut entries {
-            match entry {
-                Entry::Method { method: Method::Gather(options), .. } => options.caustics = false,
-                Entry::Method { method: Method::Neural(neural), .. } => neural.gather.caustics = false,
-                _ => {}
+            if let Entry::Method { method, .. } = entry
+                && let Some(options) = method.gather_mut()
+            {
+                options.caustics = false;
             }
         }
     }

@@ -107,7 +107,7 @@ impl Args {
 
     /// It may run a network on a device: what was fitted is not known yet.
     pub fn runs_network(&self) -> bool {
-        self.method() == MethodName::Neural || self.asks_fit()
+        self.method().needs_weights() || self.asks_fit()
     }
 
     /// No flag says how light is found.
@@ -195,7 +195,7 @@ impl<'a> Raster<'a> {
         layers: Vec<Layer>,
     ) -> Result<Self> {
         let weights = match &method {
-            Method::Neural(neural) => neural.weights.hash_text(),
+            Method::Neural(neural) | Method::Generator(neural) => neural.weights.hash_text(),
             _ => "none".into(),
         };
         let (asked, settles, needs_rays) = (method.name(), method.has_history(), method.needs_rays());

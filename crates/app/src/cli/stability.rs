@@ -2,7 +2,7 @@
 //! sheets, a record and a page.
 
 use super::{
-    args::{Global, MethodName, command_line, real_time, usage},
+    args::{Global, MethodName, command_line, usage},
     error::CliError,
     interrupt,
     progress::Progress,
@@ -10,8 +10,8 @@ use super::{
     tuned::tuned,
 };
 use anyhow::{Context, Result};
-use bouncelight::gi::Method;
-use bouncelight::net::format::Weights;
+use bouncelight::gi::{Method, Neural};
+use bouncelight_lab::network::shipped;
 use bouncelight_lab::study::{
     session::SessionError,
     stability::{self, Event, Finding, Record, StabilityError, Subject, Suite, SuiteOptions},
@@ -27,15 +27,16 @@ pub struct Args {
     /// List the tests with their thresholds and stop.
     #[arg(long, help_heading = TESTS)]
     list: bool,
-    /// Methods by name between commas, or `all`; `paper` is the network of --paper.
+    /// Methods by name between commas, or `all` that find light.
     #[arg(long, default_value = "all", value_name = "NAMES", help_heading = TESTS)]
     methods: String,
-    /// Weights of `neural` [default: the shipped `filter`].
+    /// Weights of the methods that they fit: a filter's of neural, a generator's of generator and
+    /// generator-gather [default: those that come with the program].
     #[arg(long, value_name = "FILE", help_heading = TESTS)]
     weights: Option<PathBuf>,
-    /// Weights of a network on pictures, from `weights convert` or training, tested as `paper`.
-    #[arg(long, value_name = "FILE", help_heading = TESTS)]
-    paper: Option<PathBuf>,
+    /// Generators keep their dropout on, as their authors' program does: another half of the channels in each frame.
+    #[arg(long, help_heading = TESTS)]
+    dropout: bool,
     /// Exit with code 5 if this method fails [default: gather if tested, else all methods].
     #[arg(long, value_name = "METHOD", help_heading = TESTS)]
     judge: Option<String>,
@@ -72,7 +73,7 @@ impl Args {
     /// It runs a network on a device.
     pub fn runs_network(&self) -> bool {
         let listed = |name: &str| self.methods.split(',').any(|m| m.trim() == name);
-        self.methods == "all" || listed("neural") || self.paper.is_some()
+        self.methods == "all" || MethodName::ALL.iter().any(|m| m.needs_weights() && listed(m.name()))
     }
 }
 
@@ -90,11 +91,6 @@ pub fn run(global: &Global, args: Args) -> Result<()> {
     }
     let names = names(&args)?;
     let mut subjects = names.iter().map(|n| subject(global, &args, *n)).collect::<Result<Vec<_>>>()?;
-    if let Some(path) = &args.paper {
-        let weights = Weights::load(path)?;
-        bouncelight_lab::network::pictures::check(&weights)?;
-        subjects.push(Subject::Paper(Box::new(weights)));
-    }
     let judged = judged(&args, &subjects)?;
     if let Some(out) = &args.out {
         std::fs::create_dir_all(out).with_context(|| format!("{}: the folder cannot be made", out.display()))?;
@@ -157,7 +153,7 @@ fn interrupted(error: anyhow::Error) -> anyhow::Error {
 
 fn names(args: &Args) -> Result<Vec<MethodName>> {
     if args.methods == "all" {
-        return Ok(MethodName::REAL_TIME.to_vec());
+        return Ok(MethodName::LIGHT.to_vec());
     }
     let real_time = |name: &str| {
         let found = MethodName::from_name(name).filter(|m| MethodName::REAL_TIME.contains(m));
@@ -168,7 +164,12 @@ fn names(args: &Args) -> Result<Vec<MethodName>> {
 }
 
 fn subject(global: &Global, args: &Args, name: MethodName) -> Result<Subject> {
-    let method: Method = real_time(name, global, args.weights.as_ref())?;
+    let network =
+        || shipped::fitting(name, args.weights.as_deref()).map(|w| Neural::from(w).stored(global.precision()));
+    let mut method = name.method(network)?.unwrap_or_default();
+    if let (Method::Generator(neural), true) = (&mut method, args.dropout) {
+        neural.network.dropout = Some(0);
+    }
     Ok(Subject::Method { name: name.name().into(), method })
 }
 

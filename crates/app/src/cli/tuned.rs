@@ -5,7 +5,6 @@ use super::stdout::say;
 use anyhow::{Context, Result};
 use bouncelight::gi::{Method, Neural};
 use bouncelight::gpu::Gpu;
-use bouncelight::net::format::Weights;
 use bouncelight::net::gpu::Tuned;
 use bouncelight::net::tune::{self, Cache, MAX_TEXT};
 use bouncelight_scene::image_io;
@@ -59,7 +58,7 @@ pub fn of(device: &wgpu::Device, quiet: bool) -> Arc<Tuned> {
 
 /// The method with what the user's cache knows of its network on this device; others as they are.
 pub fn tuned(mut method: Method, gpu: &Gpu, quiet: bool) -> Method {
-    if let Method::Neural(neural) = &mut method {
+    if let Method::Neural(neural) | Method::Generator(neural) = &mut method {
         neural.tuned = of(&gpu.device, quiet);
     }
     method
@@ -67,7 +66,7 @@ pub fn tuned(mut method: Method, gpu: &Gpu, quiet: bool) -> Method {
 
 /// `weights tune`.
 pub fn run(global: &Global, file: &Path, size: [u32; 2], cache: Option<PathBuf>, again: bool) -> Result<()> {
-    let weights = Weights::load(file)?;
+    let weights = bouncelight_lab::network::shipped::find(file)?;
     // As a frame runs it.
     let options = Neural::from(weights.clone()).stored(global.precision()).network;
     let path = cache.or_else(path).context("there is no cache folder here; name a file with --cache")?;

@@ -9,6 +9,7 @@ use bouncelight::net::{
     plan::{Options, Plan},
 };
 use bouncelight_lab::network::convert::{Arch, Norm, Recipe, convert};
+use bouncelight_lab::network::shipped;
 use bouncelight_scene::image_io;
 use sha2::{Digest, Sha256};
 use std::path::{Path, PathBuf};
@@ -124,10 +125,10 @@ impl Args {
 pub fn run(global: &Global, args: Args) -> Result<()> {
     match args.command {
         Command::Verify { file } => {
-            let weights = Weights::find(Some(&file))?;
+            let weights = shipped::find(&file)?;
             say!("ok: {} parameters in {}", weights.graph.parameters(), file.display());
         }
-        Command::Info { file, size } => info(&Weights::find(Some(&file))?, size)?,
+        Command::Info { file, size } => info(&shipped::find(&file)?, size)?,
         Command::Convert(args) => convert_file(&args)?,
         Command::Tune { file, size, cache, again } => {
             super::tuned::run(global, &file, size, cache, again)?;

@@ -9,10 +9,11 @@ use bouncelight::accel::{AccelError, SceneRays};
 use bouncelight::gi::{Method, Neural, ambient::AmbientTerm, gather};
 use bouncelight::gpu::Gpu;
 use bouncelight::gpu_scene::{SceneGpu, TextureMemory};
-use bouncelight::net::{format::Weights, gpu::Tuned, plan::Precision};
+use bouncelight::net::{gpu::Tuned, plan::Precision};
 use bouncelight::render::capture::{CaptureOptions, Layer, capture_with};
 use bouncelight::render::{Backdrop, Renderer, RendererOptions};
 use bouncelight::scene::{Camera, Environment, Scene};
+use bouncelight_lab::network::shipped;
 use bouncelight_lab::reference::{Kernel, Layer as Traced, ReferenceScene, Subject, Tracer, TracerOptions};
 use bouncelight_lab::study::fitted::Fitted;
 use bouncelight_lab::study::hash;
@@ -220,7 +221,7 @@ pub struct Network {
 /// The method behind a source; reads weights.
 fn method(source: Source, weights: Option<&Path>, network: &Network, rays: f32) -> Result<Method, String> {
     let with = || {
-        let weights = Weights::find(weights).map_err(|e| e.to_string())?;
+        let weights = shipped::fitting(source, weights).map_err(|e| e.to_string())?;
         let neural = Neural::from(weights).stored(network.precision);
         Ok::<_, String>(Neural { tuned: network.tuned.clone(), ..neural })
     };

@@ -10,3 +10,4 @@ pub mod convert;
 pub mod cpu;
 pub mod peak;
 pub mod pictures;
+pub mod shipped;

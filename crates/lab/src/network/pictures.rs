@@ -1,4 +1,4 @@
-//! Networks on four pictures from elsewhere: from display values to the input tensor, and back from
+//! Networks on pictures from elsewhere: from display values to the input tensor, and back from
 //! the output.
 
 use super::cpu::Tensor;
@@ -9,7 +9,7 @@ use bouncelight::gpu::{
 use bouncelight::net::{format::Weights, gpu::Network, graph::Shape};
 use thiserror::Error;
 
-/// Four pictures of one size, display values in [0, 1], RGB interleaved, rows from the top.
+/// Pictures of one size, display values in [0, 1], RGB interleaved, rows from the top.
 #[derive(Debug, Clone, Copy)]
 pub struct Pictures<'a> {
     /// Width and height, pixels.
@@ -22,13 +22,15 @@ pub struct Pictures<'a> {
     pub diffuse: &'a [f32],
     /// Normals.
     pub normal: &'a [f32],
+    /// Direct light and that of method `gather`, for networks that want it.
+    pub gathered: Option<&'a [f32]>,
 }
 
-/// Why a network cannot run on four pictures.
+/// Why a network cannot run on pictures.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 pub enum PicturesError {
     /// The network wants other inputs.
-    #[error("the weights want {wanted}, which cannot be made from four pictures: {why}")]
+    #[error("the weights want {wanted}, which cannot be made from pictures: {why}")]
     Inputs {
         /// What they want.
         wanted: String,
@@ -43,6 +45,9 @@ pub enum PicturesError {
         /// Its channels.
         channels: u32,
     },
+    /// The network wants a picture that is not there.
+    #[error("the weights want the picture `gathered`: direct light and that of method `gather`")]
+    Gathered,
     /// A picture has another number of values than `size` says.
     #[error("picture `{name}` has {values} values, {wanted} are needed")]
     Length {
@@ -55,7 +60,7 @@ pub enum PicturesError {
     },
 }
 
-/// Whether `weights` take four pictures and give one.
+/// Whether `weights` take pictures and give one.
 ///
 /// # Errors
 /// [`PicturesError::Inputs`], [`PicturesError::Output`].
@@ -81,7 +86,7 @@ pub fn check(weights: &Weights) -> Result<(), PicturesError> {
 /// The network's input for `pictures`, features in the order and encoding that the weights say.
 ///
 /// # Errors
-/// As [`check`]; [`PicturesError::Length`].
+/// As [`check`]; [`PicturesError::Gathered`], [`PicturesError::Length`].
 pub fn input(weights: &Weights, pictures: &Pictures<'_>) -> Result<Tensor, PicturesError> {
     check(weights)?;
     let [width, height] = pictures.size;
@@ -93,6 +98,7 @@ pub fn input(weights: &Weights, pictures: &Pictures<'_>) -> Result<Tensor, Pictu
             "depth" => ("depth", pictures.depth),
             "direct" => ("direct", pictures.direct),
             "diffuse" => ("diffuse", pictures.diffuse),
+            "gathered" => ("gathered", pictures.gathered.ok_or(PicturesError::Gathered)?),
             _ => ("normal", pictures.normal),
         };
         if values.len() != 3 * pixels {

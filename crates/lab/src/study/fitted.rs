@@ -186,7 +186,7 @@ impl Fitted {
         if self.schema != SCHEMA {
             return Err(format!("schema {} is not known; this program writes {SCHEMA}", self.schema));
         }
-        if !MethodName::REAL_TIME.contains(&self.method) {
+        if !MethodName::LIGHT.contains(&self.method) {
             return Err(format!("method `{}` is not a real-time method", self.method.name()));
         }
         if let Some(text) = &self.gather {

@@ -13,7 +13,6 @@ pub mod hash;
 pub mod judge;
 pub mod layers;
 pub mod moments;
-mod on_pictures;
 pub mod projection;
 pub mod rays;
 pub mod session;

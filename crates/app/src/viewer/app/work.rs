@@ -32,7 +32,7 @@ impl App {
                 });
             }
             Request::Weights(path) => self.spawn("read weights".into(), Kind::Weights, move |_| {
-                bouncelight::net::format::Weights::find(path.as_deref()).map_err(|e| e.to_string())?;
+                path.as_deref().map(bouncelight_lab::network::shipped::find).transpose().map_err(|e| e.to_string())?;
                 Ok(Product::Weights(path))
             }),
             Request::Capture { exr } => {

@@ -2,7 +2,6 @@
 
 use super::{EntryFacts, Kind};
 use bouncelight::gi::Method;
-use bouncelight::net::format::Weights;
 
 /// Something that makes a picture of a scene.
 #[derive(Debug, Clone)]
@@ -14,13 +13,6 @@ pub enum Entry {
         /// The method.
         method: Method,
     },
-    /// A network on four pictures of the rasteriser ([`crate::network::pictures`]).
-    Pictures {
-        /// Name in the chart.
-        name: String,
-        /// The network.
-        weights: Box<Weights>,
-    },
     /// The path tracer with so many samples a pixel.
     Paths(u32),
 }
@@ -29,7 +21,7 @@ impl Entry {
     /// Name in the chart.
     pub fn name(&self) -> String {
         match self {
-            Entry::Method { name, .. } | Entry::Pictures { name, .. } => name.clone(),
+            Entry::Method { name, .. } => name.clone(),
             Entry::Paths(1) => "1 path".into(),
             Entry::Paths(n) => format!("{n} paths"),
         }
@@ -38,8 +30,9 @@ impl Entry {
     /// Hash of the weights, if it has any.
     pub fn weights(&self) -> Option<String> {
         match self {
-            Entry::Method { method: Method::Neural(neural), .. } => Some(neural.weights.hash_text()),
-            Entry::Pictures { weights, .. } => Some(weights.hash_text()),
+            Entry::Method { method: Method::Neural(neural) | Method::Generator(neural), .. } => {
+                Some(neural.weights.hash_text())
+            }
             _ => None,
         }
     }
@@ -48,11 +41,11 @@ impl Entry {
     pub fn key(&self) -> String {
         match self {
             Entry::Method { method: Method::Gather(options), .. } => format!("gather {options:?}"),
-            Entry::Method { method: Method::Neural(neural), .. } => {
-                format!("neural {} {:?} {:?}", neural.weights.hash_text(), neural.network.precision, neural.gather)
+            Entry::Method { method: method @ (Method::Neural(neural) | Method::Generator(neural)), .. } => {
+                let name = method.name();
+                format!("{name} {} {:?} {:?}", neural.weights.hash_text(), neural.network.precision, neural.gather)
             }
             Entry::Method { method, .. } => method.name().into(),
-            Entry::Pictures { weights, .. } => format!("pictures {}", weights.hash_text()),
             Entry::Paths(n) => format!("paths {n}"),
         }
     }
@@ -60,8 +53,8 @@ impl Entry {
     /// As the record names it.
     pub fn facts(&self) -> EntryFacts {
         let (kind, paths) = match self {
+            Entry::Method { method: Method::Generator(_), .. } => (Kind::Pictures, None),
             Entry::Method { .. } => (Kind::Method, None),
-            Entry::Pictures { .. } => (Kind::Pictures, None),
             Entry::Paths(n) => (Kind::Paths, Some(*n)),
         };
         EntryFacts { name: self.name(), kind, weights: self.weights(), paths }

@@ -21,7 +21,6 @@ use super::{
     session::SessionError,
 };
 use crate::metrics::MetricError;
-use crate::network::pictures::PicturesError;
 use bouncelight::gpu_scene::UploadError;
 use bouncelight::net::gpu::NetError;
 use bouncelight_scene::SceneError;
@@ -251,9 +250,6 @@ pub enum ChartError {
     /// A network does not fit.
     #[error(transparent)]
     Net(#[from] NetError),
-    /// A network wants other pictures.
-    #[error(transparent)]
-    Pictures(#[from] PicturesError),
     /// A measurement failed.
     #[error(transparent)]
     Bench(#[from] BenchError),

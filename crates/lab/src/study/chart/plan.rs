@@ -44,7 +44,7 @@ impl Plan {
         let frames = f64::from(self.bench.frames + self.bench.warmup);
         match entry {
             Entry::Method { method, .. } if method.has_history() => 36.0 + 2.0 * frames + f64::from(self.samples),
-            Entry::Method { .. } | Entry::Pictures { .. } => 4.0 + frames + f64::from(self.samples),
+            Entry::Method { .. } => 4.0 + frames + f64::from(self.samples),
             Entry::Paths(n) => 1.0 + f64::from(*n) / 8.0,
         }
     }

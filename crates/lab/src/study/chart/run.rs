@@ -222,7 +222,7 @@ impl<'a> Work<'a> {
         let unit = match known(&self.before.units) {
             Some(unit) => unit,
             None => {
-                let done = self.guarded(|| stage.unit(self.gpu, self.plan, entry));
+                let done = self.guarded(|| stage.unit(self.plan, entry));
                 match done {
                     Err(ChartError::Stopped | ChartError::Session(SessionError::Stopped)) => {
                         return Err(ChartError::Stopped);

@@ -1,23 +1,16 @@
 //! One scene at work: pictures, scores and times of one entry after the other.
 
-use super::{
-    Scores, Time, Unit,
-    entries::Entry,
-    plan::Plan,
-    published::{self, PIXELS},
-};
+use super::{Scores, Time, Unit, entries::Entry, plan::Plan, published::PIXELS};
 use crate::metrics::{Comparison, MetricError};
 use crate::reference;
 use crate::study::{
     bench::{Measurement, Spread},
     judge::{self, LightError},
-    on_pictures,
     projection::Cost,
     session::{Frame, Session, Settling},
     truth::{self, Reference},
 };
 use bouncelight::gi::Method;
-use bouncelight::gpu::Gpu;
 use bouncelight::scene::Camera;
 
 /// A scene with what it is judged by.
@@ -29,49 +22,29 @@ pub(super) struct Stage<'a> {
 
 impl Stage<'_> {
     /// What is found of an entry; where it comes from is for the caller to say.
-    pub fn unit(&mut self, gpu: &Gpu, plan: &Plan, entry: &Entry) -> Result<Unit, super::ChartError> {
+    pub fn unit(&mut self, plan: &Plan, entry: &Entry) -> Result<Unit, super::ChartError> {
         match entry {
             Entry::Method { method, .. } => {
+                let lit = !matches!(method, Method::Generator(_));
                 let settling = Settling { samples: plan.samples, ..Settling::SETTLED };
                 let shot = self.session.picture(method, &self.camera, settling)?;
                 let mut cold = (None, None);
                 if method.has_history() && shot.fallback.is_none() {
                     let first = self.session.picture(method, &self.camera, Settling::COLD)?;
                     let measured = self.session.measure(method, &self.camera, plan.bench, true)?;
-                    cold = (Some(self.judged(&first)?), Some(time(&measured)));
+                    cold = (Some(self.judged(&first, lit)?), Some(time(&measured)));
                 }
                 let measured = self.session.measure(method, &self.camera, plan.bench, false)?;
                 let costs =
                     if shot.fallback.is_none() { self.session.count(method, &self.camera)? } else { Vec::new() };
                 Ok(Unit {
-                    scores: Some(self.judged(&shot)?),
+                    scores: Some(self.judged(&shot, lit)?),
                     cold: cold.0,
                     time: Some(time(&measured)),
                     cold_time: cold.1,
                     costs,
                     bytes: measured.total_bytes(),
                     fallback: shot.fallback,
-                    ..Unit::default()
-                })
-            }
-            Entry::Pictures { weights, .. } => {
-                let direct = Method::Direct;
-                let settling = Settling { frames: 1, samples: plan.samples };
-                let shot = self.session.picture(&direct, &self.camera, settling)?;
-                let sky = self.session.scene().environment.radiance;
-                let network = published::network(gpu, weights, self.session.size())?;
-                let shown = on_pictures::picture::<super::ChartError>(gpu, (weights, &network), &shot, sky)?;
-                // A saved picture has 8 bits.
-                let shown: Vec<f32> = shown.into_iter().map(|v| (v * 255.0).round() / 255.0).collect();
-                let raster = self.session.measure(&direct, &self.camera, plan.bench, false)?;
-                let (frame, own) = (raster.wall_ms, published::time(gpu, &network, plan.bench)?);
-                let wall_ms = Spread { median: frame.median + own.median, p95: frame.p95 + own.p95 };
-                let seen = judge::compare_shown(&shown, &self.reference, true)?;
-                Ok(Unit {
-                    scores: Some(self.scores(None, &seen)),
-                    time: Some(Time { gpu_ms: None, wall_ms }),
-                    costs: published::costs(&network),
-                    bytes: raster.total_bytes() + network.bytes(),
                     ..Unit::default()
                 })
             }
@@ -92,8 +65,9 @@ impl Stage<'_> {
         }
     }
 
-    fn judged(&self, shot: &Frame) -> Result<Scores, MetricError> {
-        let light = judge::light_error(&shot.added(), &self.reference);
+    /// `lit`: whether light was found, and not a picture painted.
+    fn judged(&self, shot: &Frame, lit: bool) -> Result<Scores, MetricError> {
+        let light = lit.then(|| judge::light_error(&shot.added(), &self.reference)).flatten();
         Ok(self.scores(light, &judge::compare(&shot.rgb(), &self.reference, true)?))
     }
 

@@ -185,7 +185,7 @@ impl Search<'_, '_> {
         let finer = FINER.map(|entry_scale| Candidate::gather(gather::Options { entry_scale, ..Default::default() }));
         let networks = (0..self.options.networks.len()).map(Candidate::network);
         let mut upper: Vec<Candidate> = finer.into_iter().chain(networks).collect();
-        let plain = MethodName::REAL_TIME.iter().rev().filter(|method| !method.needs_weights());
+        let plain = MethodName::LIGHT.iter().rev().filter(|method| !method.needs_weights());
         let mut ladder: Vec<Candidate> = plain.map(|method| Candidate::plain(*method)).collect();
         while let Some(candidate) = ladder.pop() {
             let mut tried = self.attempt(candidate, self.options.frames)?;

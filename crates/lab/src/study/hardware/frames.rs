@@ -56,7 +56,7 @@ pub enum Timing {
 
 /// All real-time methods in `scene` at `size`.
 pub(super) fn methods(run: &mut Run<'_>, scene: &(String, Scene), size: [u32; 2]) -> Vec<FrameRow> {
-    rows(run, scene, size, MethodName::REAL_TIME, Precision::F32)
+    rows(run, scene, size, MethodName::LIGHT, Precision::F32)
 }
 
 /// The network in 16 bits.

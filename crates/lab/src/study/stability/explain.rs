@@ -43,12 +43,16 @@ pub fn why(test: &str, subject: &str) -> Option<&'static str> {
             "what an object uncovers has eight rays a cell in its first frame, averaged over 5×5 cells: their noise. \
              More rays of entries there (8, 16, 32) change nothing"
         }
-        ("repeat", "paper") => "dropout stays on as published: each frame draws another half of the channels",
-        ("crop" | "red-wall", "paper") => {
+        ("repeat", "generator" | "generator-gather") => {
+            "dropout is on, as published: each frame draws another half of the channels"
+        }
+        ("crop" | "red-wall", "generator") => {
             "it paints the picture from the picture: what is outside it, and how large things are in it, change the \
              answer"
         }
-        ("flat", "paper") => "a network of seven halvings paints what it has learnt from clutter onto an even floor",
+        ("flat", "generator") => {
+            "a network of seven halvings paints what it has learnt from clutter onto an even floor"
+        }
         _ => return None,
     })
 }

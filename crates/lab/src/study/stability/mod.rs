@@ -37,8 +37,6 @@ pub use tests::{all, named};
 
 use super::session::SessionError;
 use crate::metrics::MetricError;
-use crate::network::pictures::PicturesError;
-use bouncelight::net::gpu::NetError;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
@@ -115,7 +113,7 @@ pub struct Test {
     pub size: [u32; 2],
     /// Paths a point of the truth.
     pub paths: u32,
-    /// Whether the paper's network can take it: it answers pictures, not light.
+    /// Whether generators can take it: they answer pictures, not light.
     pub pictures: bool,
     /// Draws and measures.
     pub run: fn(&TestRun<'_>) -> Result<Vec<f64>, StabilityError>,
@@ -130,12 +128,6 @@ pub enum StabilityError {
     /// Pictures that cannot be compared.
     #[error(transparent)]
     Metric(#[from] MetricError),
-    /// The paper's network cannot be run.
-    #[error(transparent)]
-    Network(#[from] NetError),
-    /// The paper's network wants other pictures.
-    #[error(transparent)]
-    Pictures(#[from] PicturesError),
     /// A result could not be read back.
     #[error(transparent)]
     Readback(#[from] bouncelight::gpu::readback::ReadbackError),

@@ -10,8 +10,7 @@ use glam::{Mat4, Vec3, Vec4};
 pub struct Observation {
     /// Width and height, pixels.
     pub size: [u32; 2],
-    /// What the method added, E/π, rgb interleaved. Of the paper's network, which knows no light:
-    /// its picture as it is shown.
+    /// What the method added, E/π, rgb interleaved. Of generators, which know no light: their picture.
     pub light: Vec<f32>,
     /// The picture, linear radiance, rgb interleaved.
     pub rgb: Vec<f32>,

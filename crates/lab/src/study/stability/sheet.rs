@@ -11,21 +11,16 @@ use std::path::Path;
 pub struct Moment {
     name: String,
     size: [usize; 2],
-    /// Linear radiance, or what is shown.
+    /// Linear radiance.
     rgb: Vec<f32>,
-    shown: bool,
 }
 
 impl Moment {
-    /// `shown` says that the look's picture has been through a view transform already.
-    pub(super) fn new(name: &str, look: &Observation, shown: bool) -> Self {
-        Self { name: name.into(), size: look.size.map(|n| n as usize), rgb: look.rgb.clone(), shown }
+    pub(super) fn new(name: &str, look: &Observation) -> Self {
+        Self { name: name.into(), size: look.size.map(|n| n as usize), rgb: look.rgb.clone() }
     }
 
     fn bytes(&self, gain: f32) -> Vec<u8> {
-        if self.shown {
-            return self.rgb.iter().map(|v| (v.clamp(0.0, 1.0) * 255.0 + 0.5) as u8).collect();
-        }
         Tonemap::Filmic.apply_to_bytes(&self.rgb.iter().map(|v| v * gain).collect::<Vec<_>>())
     }
 
@@ -73,7 +68,7 @@ impl Sheet {
 
     pub(super) fn push(&mut self, row: Row) {
         if self.gain.is_none() {
-            let mean = row.moments.iter().filter(|m| !m.shown).map(Moment::mean).find(|m| *m > 0.0);
+            let mean = row.moments.iter().map(Moment::mean).find(|m| *m > 0.0);
             self.gain = mean.map(|m| MIDDLE / m);
         }
         self.rows.push(row);

@@ -153,7 +153,7 @@ impl<'a> Suite<'a> {
         }
         for subject in &self.options.subjects {
             begun(subject.name())?;
-            if matches!(subject, Subject::Paper(_)) && !test.pictures {
+            if subject.paints() && !test.pictures {
                 finding.found.push(not_for_it(subject, "it answers pictures, not light"));
                 continue;
             }

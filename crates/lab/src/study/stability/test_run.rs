@@ -1,19 +1,14 @@
-//! Who draws what a test asks for: a method frame by frame with its history, the path tracer, or
-//! the paper's network.
+//! Who draws what a test asks for: a method frame by frame with its history, or the path tracer.
 
 use super::{Corruption, Script, StabilityError, observation::Observation, sheet::Moment};
 use crate::reference::{Kernel, Layer as TracedLayer, TracerOptions};
 use crate::study::{
-    hash, on_pictures,
-    session::{Frame, Session, SessionError, SessionOptions, Settling},
+    hash,
+    session::{Frame, Session, SessionError, SessionOptions},
     truth,
 };
 use bouncelight::gi::Method;
 use bouncelight::gpu::Gpu;
-use bouncelight::net::{
-    format::Weights,
-    gpu::{Network, Options},
-};
 use bouncelight::render::capture::Layer;
 use bouncelight::scene::{Camera, Scene};
 use std::{
@@ -35,8 +30,6 @@ pub enum Subject {
     },
     /// The path tracer.
     Truth,
-    /// The paper's recipe: a network on four pictures, with dropout on as published.
-    Paper(Box<Weights>),
 }
 
 impl Subject {
@@ -45,15 +38,20 @@ impl Subject {
         match self {
             Subject::Method { name, .. } => name,
             Subject::Truth => "reference",
-            Subject::Paper(_) => "paper",
         }
+    }
+
+    /// Whether it paints a picture and finds no light.
+    pub fn paints(&self) -> bool {
+        matches!(self, Subject::Method { method: Method::Generator(_), .. })
     }
 
     /// Hash of its weights, if it has any.
     pub fn weights_hash(&self) -> Option<String> {
         match self {
-            Subject::Method { method: Method::Neural(neural), .. } => Some(neural.weights.hash_text()),
-            Subject::Paper(weights) => Some(weights.hash_text()),
+            Subject::Method { method: Method::Neural(neural) | Method::Generator(neural), .. } => {
+                Some(neural.weights.hash_text())
+            }
             _ => None,
         }
     }
@@ -142,13 +140,12 @@ impl<'a> TestRun<'a> {
 
     /// Keeps frames for the short sequence.
     pub fn roll(&self, looks: &[Observation]) {
-        let shown = matches!(self.subject, Subject::Paper(_));
-        self.rolls.borrow_mut().extend((1..).zip(looks).map(|(i, l)| Moment::new(&format!("{i}"), l, shown)));
+        self.rolls.borrow_mut().extend((1..).zip(looks).map(|(i, l)| Moment::new(&format!("{i}"), l)));
     }
 
     /// Keeps a look for the contact sheet.
     pub fn keep(&self, name: &str, look: &Observation) {
-        self.moments.borrow_mut().push(Moment::new(name, look, matches!(self.subject, Subject::Paper(_))));
+        self.moments.borrow_mut().push(Moment::new(name, look));
     }
 
     /// What was kept.
@@ -181,7 +178,6 @@ impl<'a> TestRun<'a> {
         let mut looks = match self.subject {
             Subject::Method { method, .. } => self.drawn(method, scene, size, &script)?,
             Subject::Truth => self.traced(scene, size, &script)?,
-            Subject::Paper(weights) => self.painted(weights, scene, size, &script)?,
         };
         if let Some(corruption) = self.corruption {
             let wanted: Vec<u32> = (0..).zip(&script.0).filter(|(_, f)| f.wanted).map(|(i, _)| i).collect();
@@ -219,7 +215,11 @@ impl<'a> TestRun<'a> {
                 *self.fallback.borrow_mut() = Some(format!("`{}` drew: {why}", shot.drawn_by));
             }
             let camera = cameras.next().expect("a camera for each wanted frame");
-            looks.push(look_of(&shot, camera));
+            let mut look = look_of(&shot, camera);
+            if self.subject.paints() {
+                look.light = look.rgb.clone();
+            }
+            looks.push(look);
         };
         let mut change = |number: u32| script.0[number as usize].clone();
         session.render_sequence(method, &mut change, script.0.len() as u32, &mut take)?;
@@ -255,33 +255,6 @@ impl<'a> TestRun<'a> {
                 }
             };
             looks.push(look.as_ref().clone());
-        }
-        Ok(looks)
-    }
-
-    /// The paper's network on pictures as it learnt from, dropout as published.
-    fn painted(
-        &self,
-        weights: &Weights,
-        scene: &Scene,
-        size: [u32; 2],
-        script: &Script,
-    ) -> Result<Vec<Observation>, StabilityError> {
-        let layers = [Layer::DiffInd, Layer::Depth, Layer::Normal, Layer::DiffCol, Layer::GlossCol];
-        let gpu = self.stage.gpu;
-        let mut session = self.session(scene, size, &layers)?;
-        let options = Options { dropout: Some(0), ..Options::default() };
-        let mut network = Network::new(&gpu.device, &gpu.queue, weights, size, options)?;
-        let mut looks = Vec::new();
-        for frame in script.wanted_only().0 {
-            session.edit(&frame.edits)?;
-            let shot = session.picture(&Method::Direct, &frame.camera, Settling::COLD)?;
-            self.frames.set(self.frames.get() + 1);
-            network.set_seed(&gpu.queue, self.frames.get() as u32);
-            let sky = session.scene().environment.radiance;
-            let light = on_pictures::picture::<StabilityError>(gpu, (weights, &network), &shot, sky)?;
-            let look = look_of(&shot, frame.camera);
-            looks.push(Observation { rgb: light.clone(), light, ..look });
         }
         Ok(looks)
     }
