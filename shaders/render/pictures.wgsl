@@ -21,15 +21,15 @@
 // f32 or (HALF_TABLE) halves.
 @group(0) @binding(10) var<storage, read_write> table: array<vec2u>;
 
-var<workgroup> farthest: atomic<u32>;
-var<workgroup> nearest: atomic<u32>;
+var<workgroup> group_farthest: atomic<u32>;
+var<workgroup> group_nearest: atomic<u32>;
 
 @compute @workgroup_size(8, 8)
 fn depth_range(@builtin(global_invocation_id) id: vec3u, @builtin(local_invocation_index) thread: u32) {
     // Workgroup memory begins with anything (gpu/bind.rs).
     if thread == 0u {
-        atomicStore(&farthest, 0u);
-        atomicStore(&nearest, 0u);
+        atomicStore(&group_farthest, 0u);
+        atomicStore(&group_nearest, 0u);
     }
     workgroupBarrier();
     var depth = 0.0;
@@ -37,13 +37,13 @@ fn depth_range(@builtin(global_invocation_id) id: vec3u, @builtin(local_invocati
     if depth > 0.0 {
         // Bits of positive floats are in the floats' order.
         let bits = bitcast<u32>(linear_depth(frame, depth));
-        atomicMax(&farthest, bits);
-        atomicMax(&nearest, ~bits);
+        atomicMax(&group_farthest, bits);
+        atomicMax(&group_nearest, ~bits);
     }
     workgroupBarrier();
     if thread == 0u {
-        atomicMax(&range[0], atomicLoad(&farthest));
-        atomicMax(&range[1], atomicLoad(&nearest));
+        atomicMax(&range[0], atomicLoad(&group_farthest));
+        atomicMax(&range[1], atomicLoad(&group_nearest));
     }
 }
 
@@ -83,11 +83,11 @@ fn pictures(@builtin(global_invocation_id) id: vec3u) {
             let channel = 4u * i + k;
             if channel < CHANNELS { four[k] = SCALE * known[order(channel / 3u)][channel % 3u] + OFFSET; }
         }
-        put(row + i, four);
+        put_channels(row + i, four);
     }
 }
 
-fn put(at: u32, v: vec4f) {
+fn put_channels(at: u32, v: vec4f) {
     if HALF_TABLE {
         table[at] = vec2u(pack2x16float(v.xy), pack2x16float(v.zw));
     } else {

@@ -13,7 +13,8 @@ const WITHOUT_ROW: [&str; 4] = ["Matrix", "Partial", "ShadowCamera", "Options"];
 
 #[test]
 fn structs_of_shaders_lie_in_memory_as_those_of_rust() {
-    let gi = bouncelight::gi::example_preludes().into_iter().map(|(name, prelude)| (name.to_owned(), prelude));
+    let gi = bouncelight::gi::example_preludes().into_iter().chain(bouncelight::render::example_preludes());
+    let gi = gi.map(|(name, prelude)| (name.to_owned(), prelude));
     // One permutation of each shader: their numbers change no struct.
     let preludes = gi.chain(bouncelight::net::gpu::example_preludes()).collect();
     let ours = shaders::names().filter(|name| !name.starts_with("reference.") && !name.starts_with("viewer."));

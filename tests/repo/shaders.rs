@@ -2,10 +2,11 @@
 
 use bouncelight::gpu::shaders;
 
-/// Every permutation of every shader: (shader, its prelude of `const` lines). Shaders without
+/// Every permutation of every shader: (shader, its prelude). Shaders without
 /// numbers from outside have one.
 fn permutations() -> Vec<(String, String)> {
-    let gi = bouncelight::gi::example_preludes().into_iter().map(|(name, prelude)| (name.to_owned(), prelude));
+    let gi = bouncelight::gi::example_preludes().into_iter().chain(bouncelight::render::example_preludes());
+    let gi = gi.map(|(name, prelude)| (name.to_owned(), prelude));
     let mut all: Vec<_> = gi.chain(bouncelight::net::gpu::example_preludes()).collect();
     let plain = shaders::names().filter(|name| !all.iter().any(|(n, _)| n == name)).collect::<Vec<_>>();
     all.extend(plain.into_iter().map(|name| (name, String::new())));

@@ -210,7 +210,8 @@ mod tests {
     #[test]
     fn every_compute_shader_counts_and_stays_valid() {
         let mut seen = 0;
-        for (name, prelude) in bouncelight::gi::example_preludes() {
+        let render = bouncelight::render::example_preludes();
+        for (name, prelude) in bouncelight::gi::example_preludes().into_iter().chain(render) {
             let text = bouncelight::gpu::shaders::source(name, &prelude);
             if text.contains("@compute") {
                 validated(&text);

@@ -33,7 +33,8 @@ fn synthetic(width: usize, height: usize) -> [Vec<u8>; 4] {
 fn run(weights: &Weights, size: [u32; 2], bytes: &[Vec<u8>; 4]) -> Vec<f32> {
     let [depth, direct, diffuse, normal] =
         bytes.each_ref().map(|b| b.iter().map(|v| f32::from(*v) / 255.0).collect::<Vec<_>>());
-    let pictures = Pictures { size, depth: &depth, direct: &direct, diffuse: &diffuse, normal: &normal };
+    let pictures =
+        Pictures { size, depth: &depth, direct: &direct, diffuse: &diffuse, normal: &normal, gathered: None };
     let input = pictures::input(weights, &pictures).unwrap();
     pictures::picture(&cpu::run(weights, &input).unwrap())
 }
@@ -169,7 +170,8 @@ fn what_cannot_be_applied() {
     check("--depth", &path("deep.png"), 2, &["deep.png", "16 bits"]);
     check("-o", &path("out.exr"), 2, &["out.exr", ".png"]);
     let filter = root("assets/weights/filter.safetensors");
-    check("--weights", filter.to_str().unwrap(), 4, &["light", "cells", "four pictures"]);
+    check("--weights", filter.to_str().unwrap(), 4, &["light", "cells", "made from pictures"]);
+    check("--weights", "generator-gather", 4, &["want the picture `gathered`"]);
     let free = root("weights-format/fixtures/add.safetensors");
     check("--weights", free.to_str().unwrap(), 4, &["free", "nothing says what they are"]);
     if common::gpu().is_some() {
