@@ -210,9 +210,9 @@ fn weights_of(method: MethodName, path: Option<&PathBuf>) -> Result<Weights> {
     if shipped::fits(method, &weights) {
         return Ok(weights);
     }
-    let (is, wants) = if method.paints() { ("a filter's", "generator's") } else { ("a generator's", "filter's") };
-    let name = method.name();
-    Err(usage(format!("{}: these weights are {is}, method `{name}` wants a {wants}", path.display())))
+    let (wants, name) = (if method.paints() { "a generator's, on pictures" } else { "a filter's" }, method.name());
+    let table = &weights.table.name;
+    Err(usage(format!("{}: weights of table `{table}`; method `{name}` wants {wants}", path.display())))
 }
 
 /// The weights in `path`, or the shipped ones of that name; without a path the shipped filter.

@@ -21,6 +21,7 @@ use bouncelight::render::{
     capture::{CaptureOptions, Layer, Picture, capture_with},
 };
 use bouncelight::scene::{Camera, Scene};
+use bouncelight_lab::network::shipped;
 use bouncelight_scene::image_io;
 use std::path::PathBuf;
 
@@ -88,9 +89,14 @@ Examples:
   bouncelight render scene.glb -o layers.exr --aov all --samples 4";
 
 impl Args {
-    /// The method asked for, or the best that needs nothing but the scene; weights are a network's.
+    /// The method asked for, or that of the weights, or the best that needs nothing but the scene.
     fn method(&self) -> MethodName {
-        self.method.unwrap_or(if self.weights.is_some() { MethodName::Neural } else { MethodName::Gather })
+        let of_weights = |path: &PathBuf| match shipped::find(path) {
+            Ok(weights) if shipped::fits(MethodName::Generator, &weights) => MethodName::Generator,
+            // What is wrong with the file is said where it is read.
+            _ => MethodName::Neural,
+        };
+        self.method.unwrap_or_else(|| self.weights.as_ref().map_or(MethodName::Gather, of_weights))
     }
 
     /// Frames that are averaged.

@@ -144,7 +144,7 @@ mod tests {
             assert_eq!(view as usize, i);
             assert_eq!(serde_json::to_value(view).unwrap(), view.name());
         }
-        assert_eq!(next(Source::Neural, 1), Source::Direct, "the reference is chosen on purpose only");
-        assert_eq!(next(Source::Reference, -1), Source::Gather);
+        assert_eq!(next(Source::GeneratorGather, 1), Source::Direct, "the reference is chosen on purpose only");
+        assert_eq!(next(Source::Reference, -1), Source::Generator);
     }
 }

@@ -302,7 +302,8 @@ mod tests {
         use Group as G;
         let of = |labels: [&str; 3]| labels.map(Group::of);
         assert_eq!(of(["deform", "gbuffer", "shadow"]), [G::Gbuffer, G::Gbuffer, G::Direct]);
-        assert_eq!(of(["gi.trace", "indirect", "gi.pack"]), [G::Gi, G::Gi, G::Network]);
+        assert_eq!(of(["gi.trace", "indirect", "gi.features"]), [G::Gi, G::Gi, G::Network]);
         assert_eq!(of(["net.out", "tonemap", "viewer.sum"]), [G::Network, G::Post, G::Viewer]);
+        assert_eq!(of(["pictures", "paint", "composite"]), [G::Network, G::Network, G::Post]);
     }
 }

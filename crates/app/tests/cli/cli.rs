@@ -38,8 +38,8 @@ fn usage_errors_exit_with_2() {
     // Weights of the other kind.
     let render = ["render", "interior", "-o", &out, "--size", "32x16", "--method"];
     let with = |words: [&'static str; 3]| render.iter().copied().chain(words).collect::<Vec<_>>();
-    fails(&with(["neural", "--weights", "generator"]), 2, &["generator: these weights are a generator's", "filter's"]);
-    fails(&with(["generator", "--weights", "filter"]), 2, &["filter: these weights are a filter's", "generator's"]);
+    fails(&with(["neural", "--weights", "generator"]), 2, &["generator: weights of table `images`", "filter's"]);
+    fails(&with(["generator", "--weights", "filter"]), 2, &["filter: weights of table `cells`", "generator's"]);
     for method in ["rsm", "cache", "probes"] {
         fails(&["render", "interior", "-o", &out, "--method", method], 2, &[method, "replaced by `gather`"]);
         fails(&["bench", "interior", "--method", method], 2, &[method, "replaced by `gather`"]);

@@ -73,5 +73,5 @@ impl Cost {
 
 /// Whether a pass of that label finds or adds indirect light.
 pub fn is_indirect(pass: &str) -> bool {
-    pass.starts_with("gi.") || pass.starts_with("net.")
+    pass.starts_with("gi.") || pass.starts_with("net.") || ["pictures", "paint"].contains(&pass)
 }
