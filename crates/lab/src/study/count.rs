@@ -2,6 +2,7 @@
 
 use super::projection::Cost;
 use crate::count::{Count, Counted};
+use bouncelight::gi::Method;
 use bouncelight::gpu::{Gpu, GpuError, readback::ReadbackError, timing::Recorder};
 use bouncelight::gpu_scene::{SceneGpu, UploadError};
 use bouncelight::render::{RenderError, Renderer, RendererOptions, View};
@@ -58,6 +59,7 @@ pub fn frames(gpu: &Gpu, still: Still<'_>, options: RendererOptions, at: &[u32])
     let gpu = gpu.for_counting()?;
     let Still { scene, camera, size } = still;
     let rays = options.method.needs_rays();
+    let paints = matches!(options.method, Method::Generator(_));
     let mut count = Count::start();
     let mut uploaded = SceneGpu::new(&gpu.device, &gpu.queue, scene)?;
     if rays && let Err(e) = uploaded.trace(&gpu.device, &gpu.queue, scene) {
@@ -82,8 +84,8 @@ pub fn frames(gpu: &Gpu, still: Still<'_>, options: RendererOptions, at: &[u32])
         }
         if counts {
             let mut costs = added_up(count.take(&gpu)?);
-            // A frame at rest that shows the last one's cells runs no network.
-            let rests = before.is_some() && renderer.settled() == before;
+            // A frame at rest that shows the last one's cells runs no network, unless it paints.
+            let rests = !paints && before.is_some() && renderer.settled() == before;
             if let Some(plan) = renderer.plan().filter(|_| !rests) {
                 costs.extend(plan.steps.iter().map(|s| Cost::of_step(plan, s, &s.name)));
             }
