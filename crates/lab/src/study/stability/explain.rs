@@ -43,9 +43,6 @@ pub fn why(test: &str, subject: &str) -> Option<&'static str> {
             "what an object uncovers has eight rays a cell in its first frame, averaged over 5×5 cells: their noise. \
              More rays of entries there (8, 16, 32) change nothing"
         }
-        ("repeat", "generator" | "generator-gather") => {
-            "dropout is on, as published: each frame draws another half of the channels"
-        }
         ("crop" | "red-wall", "generator") => {
             "it paints the picture from the picture: what is outside it, and how large things are in it, change the \
              answer"
