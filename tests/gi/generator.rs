@@ -27,7 +27,8 @@ fn yard() -> Scene {
     scene(&blocks, &[sun(BACKWARDS, 3.0)], SKY, camera)
 }
 
-/// A generator that is given the first `count` of depth, direct, diffuse, normal and gathered, and answers number `which`.
+/// A generator that is given the first `count` of depth, direct, diffuse, normal and gathered, and
+/// answers number `which`.
 fn copying(which: usize, count: usize) -> Method {
     let mut weight = vec![0.0; 3 * 3 * count];
     (0..3).for_each(|c| weight[c * 3 * count + 3 * which + c] = 1.0);

@@ -6,7 +6,8 @@ use crate::net::gpu::{self, Tuned};
 use crate::net::plan::Precision;
 use std::sync::Arc;
 
-/// A network as a method (a filter's or a generator's): its weights, and how it runs. `weights.into()` has the defaults.
+/// A network as a method (a filter's or a generator's): its weights, and how it runs.
+/// `weights.into()` has the defaults.
 #[derive(Debug, Clone)]
 pub struct Neural {
     /// The weights.

@@ -40,8 +40,8 @@ pub struct Args {
     /// Direct light and that of method gather, of the same size, for networks that want it.
     #[arg(long, value_name = "PNG")]
     gathered: Option<PathBuf>,
-    /// Weights of a network on pictures, from `weights convert` or training; `generator`, `generator-gather`: those that come
-    /// with the program.
+    /// Weights of a network on pictures, from `weights convert` or training; `generator`,
+    /// `generator-gather`: those that come with the program.
     #[arg(long, value_name = "FILE")]
     weights: PathBuf,
     /// Picture to write; `-`: standard output.

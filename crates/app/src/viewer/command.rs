@@ -6,7 +6,9 @@ use super::state::State;
 use bouncelight::gpu_scene::TextureMemory;
 use bouncelight::net::plan::Precision;
 use bouncelight::render::Backdrop;
+use bouncelight_lab::network::shipped;
 use bouncelight_scene::units::Up;
+use std::path::Path;
 
 /// The line for the left side of the view. `output` is the file it writes, `view.png` if nobody
 /// says.
@@ -47,7 +49,9 @@ pub fn words(state: &State, output: &str) -> Vec<String> {
     if s.samples == 1 && s.left.has_history() {
         flag("accumulate", "1".into());
     }
-    if let (true, Some(weights)) = (s.left.needs_weights(), &s.weights) {
+    // Weights of another kind of network are not what draws (`shipped::fitting`).
+    let others = |path: &Path| shipped::find(path).is_ok_and(|weights| !shipped::fits(s.left, &weights));
+    if let (true, Some(weights)) = (s.left.needs_weights(), s.weights.as_ref().filter(|path| !others(path))) {
         flag("weights", weights.display().to_string());
     }
     if s.left.gathers() {
@@ -118,6 +122,21 @@ mod tests {
     use crate::viewer::state::Action;
     use bouncelight_scene::edit::LightEdit;
     use std::sync::Arc;
+
+    #[test]
+    fn the_line_names_weights_of_the_kind_that_draws() {
+        let mut state = State::new(Default::default());
+        state.show("cornell".into(), Arc::new(bouncelight_lab::scenes::paper_room::scene(3)));
+        state.settings.weights = Some("filter".into());
+        for (method, named) in [(Source::Neural, true), (Source::Generator, false), (Source::Gather, false)] {
+            state.settings.left = method;
+            assert_eq!(line(&state, None).contains(" --weights=filter"), named, "{method:?}");
+        }
+        // What cannot be read is named, so that the program says so.
+        state.settings.weights = Some("nowhere.safetensors".into());
+        state.settings.left = Source::Generator;
+        assert!(line(&state, None).contains("--weights=nowhere.safetensors"));
+    }
 
     #[test]
     fn the_line_says_everything_that_differs() {

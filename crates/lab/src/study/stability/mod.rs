@@ -3,7 +3,7 @@
 //!
 //! ```text
 //!  tests/*  one function a test, written against [`TestRun`]: "these frames, please" ─► observations ─► numbers
-//!  test_run who draws them: a method, the path tracer, the paper's network; or the path tracer spoilt by a [`Corruption`]
+//!  test_run who draws them: a method, the path tracer, or the path tracer spoilt by a [`Corruption`]
 //!  suite    runs test × subject; the path tracer must pass each test, and its spoilt copy must fail it
 //!  record   what JSON and tables are made of;  sheet: contact sheets and short sequences
 //! ```
