@@ -4,8 +4,11 @@
 
 With BOUNCELIGHT=FILE naming the program, the exported file also goes through `apply` and `weights convert`.
 """
+import importlib.util
 import json
+import math
 import os
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -209,6 +212,12 @@ class Toy(unittest.TestCase):
             self.run_in("whole-published", self.config(seed=2))
         for name in ("config.json", "log.csv", "loss.png", "validation.png"):
             self.assertTrue(os.path.getsize(os.path.join(self.folder, "whole-published", name)), name)
+        # It goes on with more steps at its end only.
+        self.run_in("stopped", self.config(), stop_after=3).save()
+        with self.assertRaisesRegex(TrainingError, "another steps"):
+            self.run_in("stopped", self.config(steps=30))
+        shutil.copytree(os.path.join(self.folder, "whole-published"), os.path.join(self.folder, "further"))
+        self.assertEqual(self.run_in("further", self.config(steps=30)).step, 30)
         run, out = os.path.join(self.folder, "whole-published"), os.path.join(self.folder, "toy.safetensors")
         sizes = []
         for stored, delta in (("f32", 1e-6), ("f16", 1e-2), ("i8", 1e-2)):
@@ -256,6 +265,19 @@ class Toy(unittest.TestCase):
         subprocess.run([PROGRAM, "apply", *flags, "--weights", out, "-o", made, "-q", "--dropout", "1"], check=True, capture_output=True)
         self.assertGreater(np.abs(np.asarray(Image.open(made)).astype(int) - expected).max(), 1)
 
+    @unittest.skipUnless(PROGRAM and importlib.util.find_spec("pyoidn"), "SKIP: BOUNCELIGHT does not name the program, or no pyoidn")
+    def test_views_of_a_scene_are_inside_it(self):
+        eye, target, fov = views.camera_of([2 * math.tan(math.radians(30)) * 4 / 32, 1, 2, 3, 0, 0, -1], 32)
+        self.assertEqual((eye, target), ([1, 2, 3], [1, 2, 2]))
+        self.assertAlmostEqual(fov, 60)
+        out = os.path.join(self.folder, "scene")
+        views.main([out, "--scene", "cornell", "--views", "2", "--size", "64x32", "--spp", "1", "--sky", "0.1,0.2,0.3", "--bouncelight", PROGRAM])
+        self.assertEqual(sorted(os.listdir(out)), ["cornell000.npz", "cornell001.npz"])
+        for name in os.listdir(out):
+            pictures, _ = views.read(os.path.join(out, name))
+            # In a box that is shut on all sides but one, most pixels have a colour, light and a place.
+            for part in ("diffuse", "target", "gathered", "normal"):
+                self.assertGreater((pictures[part].max(-1) > 0).mean(), 0.3, (name, part))
 
     @unittest.skipUnless(PROGRAM, "SKIP: BOUNCELIGHT does not name the program")
     def test_frames_are_given_what_views_hold(self):

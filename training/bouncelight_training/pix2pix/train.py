@@ -13,7 +13,7 @@ since rooms are as likely in other colours.
 
 Everything lands in the run's folder: config.json, checkpoint.pt, log.csv, loss.png, validation.png. The same command goes on where a
 killed run stopped, with the same bits as without the interruption: what a step sees and what dropout drops depend on seed and step
-alone. Validation is without dropout.
+alone. A run at its end goes on with more --steps. Validation is without dropout.
 """
 import argparse
 import csv
@@ -70,6 +70,8 @@ class Config:
 
 # What may differ between a run's first command and the one that continues it.
 FREE = {"views", "threads", "device", "checkpoint_seconds"}
+# What may differ, too, once the run is at its end: it goes on, the learning rate rises and falls again.
+FURTHER = {"steps", "whole", "learning_rate"}
 
 
 def load(module, tensors):
@@ -133,7 +135,8 @@ class Run:
             return
         state = read_checkpoint(self.checkpoint_path)
         ours = dataclasses.asdict(self.config)
-        differ = [k for k in ours if k not in FREE and ours[k] != state["config"].get(k)]
+        free = FREE | FURTHER if state["step"] >= state["config"]["steps"] else FREE
+        differ = [k for k in ours if k not in free and ours[k] != state["config"].get(k)]
         if differ:
             raise TrainingError(f"{self.checkpoint_path} was made with another {differ[0]} ({state['config'].get(differ[0])}, now {ours[differ[0]]}); use another --run")
         if state["report"] != self.examples.report:

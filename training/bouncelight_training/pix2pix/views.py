@@ -1,7 +1,7 @@
 """Views for the paper's recipe, a file each: what the rasteriser knows, what `gather` makes of it, and what a path tracer shows.
 
     python -m bouncelight_training.pix2pix.views data/rooms --rooms 2-5,48-347 --bouncelight ../target/release/bouncelight
-    python -m bouncelight_training.pix2pix.views data/interior --scene interior --views 48 --size 512x256 --spp 32 --bouncelight …
+    python -m bouncelight_training.pix2pix.views data/interior --scene interior --sky 0.55,0.72,1 --views 48 --size 512x256 --spp 32 --bouncelight …
 
 Rooms are seen as the authors saw them, their targets are Cycles' (bpy); a scene is seen from places around its camera (as
 `bouncelight dataset --recipe scene` finds them), its targets are `bouncelight trace`'s. Both are denoised by Open Image Denoise, so
@@ -22,6 +22,7 @@ the work. Rooms kept for judging are refused.
 """
 import argparse
 import json
+import math
 import os
 import subprocess
 import sys
@@ -41,6 +42,8 @@ GATHERED, TARGET = "gathered", "target"
 ALL = (*PICTURES, GATHERED, TARGET)
 # Blender's Normalize node takes what is farther for background.
 FARTHEST = 1e4
+# Of the small pictures that places in a scene are looked for with.
+HEIGHT = 32
 LAYERS = "DiffDir,DiffCol,GlossDir,GlossCol,Emit,Normal,Depth"
 CYCLES = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "..", "cycles")
 
@@ -71,7 +74,7 @@ def of(layer):
 
 def inputs_of(path, sky=SKY_RADIANCE):
     """The network's pictures of a raster EXR by name, bytes [h,w,3]: PICTURES, and `gathered`, which is the file's own picture.
-    Direct light is made of the file's layers; without them the file's picture is taken for it. `sky`: radiance from everywhere."""
+    Direct light is made of the file's layers; without them the file's picture is taken for it. `sky`: radiance from everywhere, L or (R, G, B)."""
     channels = layers(path)
     get = lambda names: stacked(channels, names, path)
     picture, diffuse, glossy, depth = get("RGB"), get(of("DiffCol")), get(of("GlossCol")), get(["Depth.Z"])
@@ -84,7 +87,7 @@ def inputs_of(path, sky=SKY_RADIANCE):
         light = np.where(surface, get(of("DiffDir")) * diffuse + get(of("GlossDir")) * glossy + get(of("Emit")), picture)
     nearest, farthest = depth[surface].min(), depth[surface].max()
     stretched = np.where(surface, (depth - nearest) / max(farthest - nearest, 1e-6), 1.0)
-    return {"depth": shown(np.repeat(stretched, 3, -1)), "direct": shown(light + sky * (diffuse + glossy) * surface), "diffuse": shown(diffuse),
+    return {"depth": shown(np.repeat(stretched, 3, -1)), "direct": shown(light + np.asarray(sky, np.float32) * (diffuse + glossy) * surface), "diffuse": shown(diffuse),
             "normal": shown(np.maximum(np.stack([x, -z, y], -1), 0)), GATHERED: shown(picture)}
 
 
@@ -155,13 +158,20 @@ class Rooms:
         return target_of(path)
 
 
+def camera_of(view, height):
+    """Eye, target and vertical field of view in degrees of a sample's `view` (README, "The data"): what a cell of 4 pixels covers at distance 1,
+    place and direction, of a picture so many pixels high."""
+    foot, eye, ahead = view[0], view[1:4], view[4:7]
+    return eye, [e + a for e, a in zip(eye, ahead)], math.degrees(2 * math.atan(0.5 * foot * height / 4))
+
+
 class Scene:
     """Places around one scene's camera, with our path tracer for targets."""
 
     def __init__(self, a):
         self.a, self.sky, self.targets = a, a.sky, f"bouncelight trace, {a.spp} samples a pixel, denoised"
         with tempfile.TemporaryDirectory() as folder:
-            run([a.bouncelight, "dataset", "--recipe", "scene", "--scene", a.scene, "--views", str(a.views), "--seed", str(a.seed), "--spp", "1", "--moments", "1", "--size", "64x32", "--out", folder])
+            run([a.bouncelight, "dataset", "--recipe", "scene", "--scene", a.scene, "--views", str(a.views), "--seed", str(a.seed), "--spp", "1", "--moments", "1", "--size", f"{2 * HEIGHT}x{HEIGHT}", "--out", folder])
             from safetensors.numpy import load_file
             found = sorted(name for name in os.listdir(folder) if name.endswith(".safetensors"))
             self.cameras = [load_file(os.path.join(folder, name))["view"].tolist() for name in found]
@@ -171,8 +181,7 @@ class Scene:
         return [(f"{name}{i:03}", i) for i in range(len(self.cameras))]
 
     def words(self, index):
-        v = self.cameras[index]
-        return [self.a.scene, *words_of(v[:3], v[3:6], v[6])]
+        return [self.a.scene, *words_of(*camera_of(self.cameras[index], HEIGHT))]
 
     def target(self, index, raster, path):
         try:
@@ -204,7 +213,7 @@ def main(arguments=None):
     parser.add_argument("--scene", help="a scene instead of rooms: a file or a bundled one")
     parser.add_argument("--views", type=int, default=48, help="places in the scene")
     parser.add_argument("--seed", type=int, default=0, help="of those places")
-    parser.add_argument("--sky", type=float, default=0.0, help="radiance that direct light of the scene gets from everywhere")
+    parser.add_argument("--sky", default="0", type=lambda t: tuple(map(float, t.split(","))), help="radiance that direct light of the scene gets from everywhere: L or R,G,B")
     parser.add_argument("--size", default="1024x512", type=lambda t: tuple(map(int, t.split("x"))))
     parser.add_argument("--samples", default="4,1", type=lambda t: tuple(map(int, t.split(","))), help="jittered frames of the inputs, view by view in turn")
     parser.add_argument("--spp", type=int, default=4, help="paths a pixel of the target")

@@ -14,7 +14,7 @@ use bouncelight::gi::{Method, Neural};
 use bouncelight_lab::network::shipped;
 use bouncelight_lab::study::{
     session::SessionError,
-    stability::{self, Event, Finding, Record, StabilityError, Subject, Suite, SuiteOptions},
+    stability::{self, Event, Finding, Overview, Record, StabilityError, Subject, Suite, SuiteOptions},
 };
 use bouncelight_scene::image_io;
 use std::path::PathBuf;
@@ -43,7 +43,8 @@ pub struct Args {
     /// Do not count failures that docs/reports/stability.md explains.
     #[arg(long, help_heading = TESTS)]
     allow_known: bool,
-    /// Folder for contact sheets, short sequences, the record and traced references.
+    /// Folder for contact sheets, short sequences, the record and traced references; of several tests also one sheet,
+    /// method by method.
     #[arg(long, value_name = "DIR", help_heading = OUTPUT)]
     out: Option<PathBuf>,
     /// Keep findings in --out that this program, device and weights made.
@@ -114,6 +115,7 @@ pub fn run(global: &Global, args: Args) -> Result<()> {
     let quiet = args.json.as_deref().is_some_and(|p| p.as_os_str() == "-");
     let mut progress = Progress::new(global, "tests", suite.steps());
     let mut begun = 0u32;
+    let mut overview = Overview::default();
     let record = suite.run(&|| !interrupt::requested(), &mut |event| -> Result<()> {
         match event {
             Event::Begun { .. } => {
@@ -127,6 +129,7 @@ pub fn run(global: &Global, args: Args) -> Result<()> {
                 }
             }
             Event::Done { finding, sheet } => {
+                overview.push(sheet);
                 if let Some(out) = &args.out {
                     sheet.write(&out.join(format!("{}.png", finding.name)))?;
                     sheet.write_film(&out.join(format!("{}.apng.png", finding.name)))?;
@@ -140,6 +143,9 @@ pub fn run(global: &Global, args: Args) -> Result<()> {
     });
     progress.finish();
     let record = record.map_err(interrupted)?;
+    if let Some(out) = &args.out {
+        overview.write(&out.join("overview.png"))?;
+    }
     write(&args, &record)?;
     verdict(&args, &record, &judged)
 }

@@ -3,7 +3,9 @@
 
 use crate::common;
 use bouncelight::gi::Method;
-use bouncelight_lab::study::stability::{self, Event, Finding, Record, StabilityError, Subject, Suite, SuiteOptions};
+use bouncelight_lab::study::stability::{
+    self, Event, Finding, Overview, Record, StabilityError, Subject, Suite, SuiteOptions,
+};
 use bouncelight_scene::image_io;
 
 fn method(name: &str, method: Method) -> Subject {
@@ -25,13 +27,16 @@ fn gather_passes_what_ambient_fails_and_every_control_fails() {
     ];
     let tests = stability::named("sealed,thin-wall,saturated,half").expect("they are there");
     let suite = Suite::new(&gpu, SuiteOptions { tests, subjects, kept: None, resume: None });
-    let mut begun = 0;
+    let (mut begun, mut overview) = (0, Overview::default());
+    let mut written = Vec::new();
     let record: Record = suite
         .run(&|| true, &mut |event| -> Result<(), StabilityError> {
             match event {
                 Event::Begun { .. } => begun += 1,
                 Event::Known { .. } => panic!("nothing was kept"),
                 Event::Done { finding, sheet } => {
+                    overview.push(sheet);
+                    written.push(overview.write(&folder.path().join("overview.png"))?);
                     sheet.write(&folder.path().join(format!("{}.png", finding.name)))?;
                     assert!(!sheet.write_film(&folder.path().join("none.png"))?, "nothing moves here");
                 }
@@ -63,6 +68,10 @@ fn gather_passes_what_ambient_fails_and_every_control_fails() {
     let sheet = image_io::read_png(&folder.path().join("sealed.png")).expect("a picture");
     // Four rows: the truth and three methods.
     assert!(sheet.height > 4 * 128 && sheet.pixels.iter().any(|v| *v > 0.5));
+    // One sheet of several tests, a column each; of one test there is none.
+    assert_eq!(written, [false, true, true, true]);
+    let overview = image_io::read_png(&folder.path().join("overview.png")).expect("a picture");
+    assert!(overview.width > 4 * 256 && overview.height > 4 * 128, "{}×{}", overview.width, overview.height);
 }
 
 /// The truth itself passes in units a thousand times as large, and what a slow history shows in a

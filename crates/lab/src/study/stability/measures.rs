@@ -67,6 +67,18 @@ pub fn at_same_places(a: &Observation, b: &Observation) -> (f64, f64) {
     (ratio(pairs), shown / surfaces.max(1.0))
 }
 
+/// `b` with `gain` · |b − a| of the light at the same places for a picture; black where `a` does not show them.
+pub fn shown_change(a: &Observation, b: &Observation, gain: f32) -> Observation {
+    let fetch = Fetch::new(a);
+    let mut rgb = vec![0.0; b.rgb.len()];
+    for (pixel, place) in b.positions().into_iter().enumerate() {
+        let Some(then) = place.and_then(|p| fetch.at(p, b.normal_at(pixel))) else { continue };
+        let now = b.light_at(pixel);
+        (0..3).for_each(|c| rgb[3 * pixel + c] = gain * (now[c] - then[c]).abs());
+    }
+    Observation { rgb, ..b.clone() }
+}
+
 /// Mean light of the places that `b` shows, too: in `a` and in `b`.
 pub fn means_at_same_places(a: &Observation, b: &Observation) -> [[f64; 3]; 2] {
     let fetch = Fetch::new(a);

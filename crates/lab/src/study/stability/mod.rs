@@ -30,7 +30,7 @@ pub use observation::Observation;
 pub use page::page;
 pub use record::{Criterion, Finding, Found, Record, SCHEMA};
 pub use script::Script;
-pub use sheet::{Moment, Sheet};
+pub use sheet::{Moment, Overview, Sheet};
 pub use suite::{Event, Suite, SuiteOptions};
 pub use test_run::{Subject, TestRun};
 pub use tests::{all, named};
@@ -109,7 +109,7 @@ pub struct Test {
     pub limits: &'static [Limit],
     /// With what the truth is spoilt, so that the test must fail.
     pub control: Corruption,
-    /// Width and height of its pictures, pixels.
+    /// Width and height of its pictures, pixels; generators draw larger ones ([`Test::size_of`]).
     pub size: [u32; 2],
     /// Paths a point of the truth.
     pub paths: u32,
@@ -117,6 +117,17 @@ pub struct Test {
     pub pictures: bool,
     /// Draws and measures.
     pub run: fn(&TestRun<'_>) -> Result<Vec<f64>, StabilityError>,
+}
+
+/// Generators know things as large as they are in pictures of this width, pixels.
+const PAINTED: u32 = 512;
+
+impl Test {
+    /// Width and height of the pictures that `subject` draws, pixels.
+    pub fn size_of(&self, subject: &Subject) -> [u32; 2] {
+        let times = if subject.paints() { PAINTED.div_ceil(self.size[0]) } else { 1 };
+        self.size.map(|n| n * times)
+    }
 }
 
 /// Why a test could not be run, which is no answer of a method.

@@ -52,6 +52,8 @@ pub struct Sheet {
 
 /// Height of a line of text, pixels.
 const LINE: usize = 12;
+/// Width of a letter, pixels.
+const LETTER: usize = 8;
 /// Space between pictures, pixels.
 const GAP: usize = 4;
 /// Pictures are enlarged to about this width, pixels.
@@ -101,17 +103,19 @@ impl Sheet {
     fn paint(&self) -> Option<Canvas> {
         let columns = self.rows.iter().map(|r| r.moments.len()).max().filter(|n| *n > 0)?;
         let size = self.rows.iter().flat_map(|r| &r.moments).map(|m| m.size).next()?;
-        let zoom = WIDE.div_ceil(size[0]).clamp(1, 4);
-        let cell = [size[0] * zoom + GAP, size[1] * zoom + 2 * LINE];
-        let mut canvas =
-            Canvas::new((columns * cell[0] + GAP).max(8 * self.title.len() + 8), self.rows.len() * cell[1] + 2 * LINE);
+        let shown = enlarged(size);
+        let cell = [shown[0] + GAP, shown[1] + 2 * LINE];
+        let mut canvas = Canvas::new(
+            (columns * cell[0] + GAP).max(LETTER * (self.title.len() + 1)),
+            self.rows.len() * cell[1] + 2 * LINE,
+        );
         canvas.text(GAP, GAP, &self.title);
         for (r, row) in self.rows.iter().enumerate() {
             let y = 2 * LINE + r * cell[1];
             canvas.text(GAP, y, &format!("{}  {}", row.name, row.verdict));
             for (c, moment) in row.moments.iter().enumerate() {
                 let x = GAP + c * cell[0];
-                canvas.picture([x, y + LINE], zoom, moment, self.gain.unwrap_or(1.0));
+                canvas.picture([x, y + LINE], shown, moment, self.gain.unwrap_or(1.0));
                 canvas.label(x + 2, y + LINE + 2, &moment.name);
             }
         }
@@ -123,17 +127,72 @@ impl Sheet {
         let rows: Vec<&Row> = self.rows.iter().filter(|r| !r.rolls.is_empty()).collect();
         let longest = rows.iter().map(|r| r.rolls.len()).max().filter(|n| i < *n)?;
         let size = rows.first()?.rolls[0].size;
-        let zoom = WIDE.div_ceil(size[0]).clamp(1, 4);
-        let cell = [size[0] * zoom + GAP, size[1] * zoom + LINE + GAP];
+        let shown = enlarged(size);
+        let cell = [shown[0] + GAP, shown[1] + LINE + GAP];
         let mut canvas = Canvas::new(rows.len().min(3) * cell[0] + GAP, rows.len().div_ceil(3) * cell[1] + GAP);
         for (n, row) in rows.iter().enumerate() {
             let (x, y) = (GAP + n % 3 * cell[0], GAP + n / 3 * cell[1]);
             let moment = &row.rolls[i.min(row.rolls.len() - 1)];
             canvas.text(x, y, &format!("{} {}/{longest}", row.name, i + 1));
-            canvas.picture([x, y + LINE], zoom, moment, self.gain.unwrap_or(1.0));
+            canvas.picture([x, y + LINE], shown, moment, self.gain.unwrap_or(1.0));
         }
         Some(canvas)
     }
+}
+
+/// The last picture of each test and subject on one sheet: a row a subject, a column a test.
+#[derive(Default)]
+pub struct Overview(Vec<Sheet>);
+
+impl Overview {
+    /// Adds a test's column, if there are pictures of it.
+    pub fn push(&mut self, sheet: &Sheet) {
+        let last = |row: &Row| Row {
+            moments: row.moments.last().cloned().into_iter().collect(),
+            rolls: Vec::new(),
+            ..row.clone()
+        };
+        let rows: Vec<Row> = sheet.rows.iter().map(last).filter(|row| !row.moments.is_empty()).collect();
+        if !rows.is_empty() {
+            self.0.push(Sheet { title: sheet.title.clone(), rows, gain: sheet.gain });
+        }
+    }
+
+    /// Writes the sheet as PNG; nothing where there is one test at most.
+    ///
+    /// # Errors
+    /// The file cannot be written.
+    pub fn write(&self, path: &Path) -> Result<bool, StabilityError> {
+        let Some(longest) = self.0.iter().max_by_key(|test| test.rows.len()).filter(|_| self.0.len() > 1) else {
+            return Ok(false);
+        };
+        let names: Vec<&str> = longest.rows.iter().map(|row| row.name.as_str()).collect();
+        let sizes: Vec<_> = self.0.iter().map(|test| enlarged(test.rows[0].moments[0].size)).collect();
+        let height = sizes.iter().map(|size| size[1]).max().unwrap_or(0) + 2 * LINE;
+        let wide = |size: &[usize; 2]| size[0].max(WIDE) + GAP;
+        let mut canvas = Canvas::new(GAP + sizes.iter().map(wide).sum::<usize>(), LINE + names.len() * height);
+        let mut x = GAP;
+        for (test, size) in self.0.iter().zip(&sizes) {
+            canvas.text(x, 2, test.title.split(':').next().unwrap_or_default());
+            for (r, name) in names.iter().enumerate() {
+                let Some(row) = test.rows.iter().find(|row| row.name == *name) else { continue };
+                let y = LINE + r * height;
+                let text: String = format!("{} {}", row.name, row.verdict).chars().take(size[0] / LETTER).collect();
+                canvas.text(x, y, &text);
+                canvas.picture([x, y + LINE], *size, &row.moments[0], test.gain.unwrap_or(1.0));
+                canvas.label(x + 2, y + LINE + 2, &row.moments[0].name);
+            }
+            x += wide(size);
+        }
+        image_io::write_png(path, canvas.width as u32, canvas.height as u32, &canvas.rgb, &[])?;
+        Ok(true)
+    }
+}
+
+/// Size in which a picture is shown, pixels.
+fn enlarged(size: [usize; 2]) -> [usize; 2] {
+    let zoom = WIDE.div_ceil(size[0]).clamp(1, 4);
+    size.map(|n| n * zoom)
 }
 
 /// RGB bytes that are painted on.
@@ -158,18 +217,27 @@ impl Canvas {
         }
     }
 
-    fn picture(&mut self, [x, y]: [usize; 2], zoom: usize, moment: &Moment, gain: f32) {
+    /// Puts a picture into a rectangle: pixels are repeated where it is larger, averaged where it is smaller.
+    fn picture(&mut self, [x, y]: [usize; 2], size: [usize; 2], moment: &Moment, gain: f32) {
         let bytes = moment.bytes(gain);
-        let [w, h] = moment.size;
-        for (py, px) in (0..h * zoom).flat_map(|py| (0..w * zoom).map(move |px| (py, px))) {
-            let at = 3 * (py / zoom * w + px / zoom);
-            self.put(x + px, y + py, [bytes[at], bytes[at + 1], bytes[at + 2]]);
+        let range = |at: usize, axis: usize| {
+            let from = at * moment.size[axis] / size[axis];
+            from..((at + 1) * moment.size[axis] / size[axis]).max(from + 1)
+        };
+        for (py, px) in (0..size[1]).flat_map(|py| (0..size[0]).map(move |px| (py, px))) {
+            let (mut sum, mut count) = ([0u32; 3], 0);
+            for (sy, sx) in range(py, 1).flat_map(|sy| range(px, 0).map(move |sx| (sy, sx))) {
+                let at = 3 * (sy * moment.size[0] + sx);
+                (0..3).for_each(|c| sum[c] += u32::from(bytes[at + c]));
+                count += 1;
+            }
+            self.put(x + px, y + py, sum.map(|v| (v / count) as u8));
         }
     }
 
     /// Text on a picture: over a strip that makes it readable.
     fn label(&mut self, x: usize, y: usize, text: &str) {
-        for (dx, dy) in (0..8 * text.chars().count() + 2).flat_map(|dx| (0..10).map(move |dy| (dx, dy))) {
+        for (dx, dy) in (0..LETTER * text.chars().count() + 2).flat_map(|dx| (0..10).map(move |dy| (dx, dy))) {
             self.put((x + dx).saturating_sub(1), (y + dy).saturating_sub(1), PAPER);
         }
         self.text(x, y, text);
@@ -180,7 +248,7 @@ impl Canvas {
             let rows = font8x8::BASIC_FONTS.get(letter).or_else(|| font8x8::LATIN_FONTS.get(letter));
             for (dy, row) in rows.unwrap_or_default().into_iter().enumerate() {
                 for dx in (0..8).filter(|dx| row >> dx & 1 == 1) {
-                    self.put(x + 8 * i + dx, y + dy, INK);
+                    self.put(x + LETTER * i + dx, y + dy, INK);
                 }
             }
         }

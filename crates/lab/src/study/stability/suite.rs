@@ -130,7 +130,7 @@ impl<'a> Suite<'a> {
         let mut sheet = Sheet::new(test);
         let mut begun = |subject: &str| told(Event::Begun { test, subject });
         let take = |subject: &Subject, corruption| {
-            let run = TestRun::new(stage, subject, corruption, test.size, test.paths);
+            let run = TestRun::new(stage, subject, corruption, test.size_of(subject), test.paths);
             let values = (test.run)(&run);
             (values, run.end())
         };

@@ -127,10 +127,14 @@ impl<'a> TestRun<'a> {
         self.subject
     }
 
-    /// What is true of a still scene, not spoilt, whoever draws.
+    /// What is true of a still scene, not spoilt, whoever draws; the picture for light, where a generator does.
     pub fn truth(&self, scene: &Scene, camera: &Camera) -> Result<Observation, StabilityError> {
         let mut looks = self.traced(scene, self.size, &Script::new().look(camera))?;
-        Ok(looks.pop().expect("one frame was wanted"))
+        let mut look = looks.pop().expect("one frame was wanted");
+        if self.subject.paints() {
+            look.light = look.rgb.clone();
+        }
+        Ok(look)
     }
 
     /// The same test drawn by another subject.

@@ -25,7 +25,7 @@ pub static METAL: Test = Test {
     control: Corruption::Gain(2.0),
     size: SIZE,
     paths: 128,
-    pictures: false,
+    pictures: true,
     run: |run| against_truth(run, [0.3, 0.5, 0.75, 1.0]),
 };
 

@@ -15,8 +15,8 @@ use super::{StabilityError, Test};
 /// Size of most tests' pictures: cells of 4×4 pixels, and seconds on a CPU.
 const SMALL: [u32; 2] = [96, 64];
 
-/// Size of tests that the paper's network takes, too: the one it has learnt at.
-const PAPER: [u32; 2] = [256, 128];
+/// Size of tests whose surfaces have to hold many cells.
+const LARGE: [u32; 2] = [256, 128];
 
 /// Frames after which a method's history is long enough to show what it does.
 const LONG: usize = 40;

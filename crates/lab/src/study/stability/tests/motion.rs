@@ -16,7 +16,7 @@ pub static JITTER: Test = Test {
     control: Corruption::Noise(0.8),
     size: SMALL,
     paths: 128,
-    pictures: false,
+    pictures: true,
     run: |run| {
         // A pixel is 0.9 degrees wide; a van der Corput sequence of offsets.
         let offsets = [0.5, 0.25, 0.75, 0.125].map(|u| 0.9 * (u - 0.5));
@@ -56,6 +56,7 @@ fn flicker(run: &TestRun<'_>, degrees: &[f32], pairs: usize) -> Result<Vec<f64>,
     let looks = run.render_sequence(&hall, script)?;
     run.roll(&looks);
     looks.iter().zip(["one", "two", "three"]).for_each(|(look, name)| run.keep(name, look));
+    run.keep("change ×8", &measures::shown_change(&looks[looks.len() - 2], &looks[looks.len() - 1], 8.0));
     let sum: f64 = looks.windows(2).map(|pair| measures::at_same_places(&pair[0], &pair[1]).0).sum();
     Ok(vec![sum / (looks.len() - 1) as f64])
 }

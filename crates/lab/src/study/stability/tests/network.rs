@@ -1,7 +1,7 @@
 //! What networks are known to do: splotches, coarse numbers, scenes unlike those they have learnt.
 
 use super::super::{Corruption, Limit, Observation, StabilityError, Subject, Test, measures, rooms};
-use super::{LONG, PAPER, SMALL};
+use super::{LARGE, LONG, SMALL};
 use bouncelight::gi::Method;
 use bouncelight::net::plan::Precision;
 use bouncelight::scene::{Camera, ColorSpace, Image, Sampler, Scene, TextureRef};
@@ -17,7 +17,7 @@ pub static FLAT: Test = Test {
         "physics: under an open sky a floor has one light; twice the least contrast that an eye sees",
     )],
     control: Corruption::Screen(0.5),
-    size: PAPER,
+    size: LARGE,
     paths: 8,
     pictures: true,
     run: |run| {
@@ -69,7 +69,7 @@ pub static UNSEEN: Test = Test {
     control: Corruption::Gain(1.3),
     size: [128, 64],
     paths: 128,
-    pictures: false,
+    pictures: true,
     run: |run| {
         let (scene, camera) = still_life();
         let (look, truth) = (run.settled(&scene, &camera, LONG)?, run.truth(&scene, &camera)?);

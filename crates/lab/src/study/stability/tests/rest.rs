@@ -1,7 +1,7 @@
 //! A still camera before a still scene.
 
 use super::super::{Corruption, Limit, Script, StabilityError, Test, TestRun, measures, rooms};
-use super::{LONG, PAPER, SMALL};
+use super::{LARGE, LONG, SMALL};
 use bouncelight::scene::{Camera, Scene};
 
 const STILL: &str = "half of the least contrast that an eye sees, 1 % (Weber)";
@@ -20,7 +20,7 @@ pub static FROZEN: Test = Test {
     control: Corruption::Noise(0.1),
     size: SMALL,
     paths: 16,
-    pictures: false,
+    pictures: true,
     run: |run| {
         at_rest(run, &rooms::hall(rooms::GREY, &[rooms::sun(rooms::BACKWARDS, 2.0)], 0.02), &rooms::hall_camera(), 100)
     },
@@ -54,7 +54,7 @@ pub static REPEAT: Test = Test {
         "to the bit: what differs by chance flickers",
     )],
     control: Corruption::Noise(0.01),
-    size: PAPER,
+    size: LARGE,
     paths: 4,
     pictures: true,
     run: |run| {
@@ -89,6 +89,7 @@ fn at_rest(run: &TestRun<'_>, scene: &Scene, camera: &Camera, frames: usize) -> 
     let looks = run.render_sequence(scene, script)?;
     run.keep(&format!("frame {half}"), &looks[0]);
     run.keep(&format!("frame {frames}"), &looks[2]);
+    run.keep("change ×8", &measures::shown_change(&looks[1], &looks[2], 8.0));
     debug_assert!(frames >= LONG);
     let change = measures::change(&looks[1], &looks[2]);
     let largest = measures::largest_change(&looks[1], &looks[2]);

@@ -1,7 +1,7 @@
 //! What is seen must not decide what light there is.
 
 use super::super::{Corruption, Limit, Script, Test, measures, rooms};
-use super::{LONG, PAPER, SMALL};
+use super::{LARGE, LONG, SMALL};
 use bouncelight::scene::Camera;
 
 const SAME: &str = "physics: diffuse light does not depend on the camera; 5 % is a fourteenth of a stop";
@@ -14,7 +14,7 @@ pub static RED_WALL: Test = Test {
         Limit::share("change of red over green there", 0.02, "twice the least contrast that an eye sees"),
     ],
     control: Corruption::Screen(0.5),
-    size: PAPER,
+    size: LARGE,
     paths: 128,
     pictures: true,
     run: |run| {
@@ -41,7 +41,7 @@ pub static CROP: Test = Test {
     question: "Do the same pixels show the same light in a narrower picture?",
     limits: &[Limit::share("change of light at the same places, over 4×4 pixels", 0.05, SAME)],
     control: Corruption::Screen(1.0),
-    size: PAPER,
+    size: LARGE,
     paths: 160,
     pictures: true,
     run: |run| {
