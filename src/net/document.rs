@@ -3,9 +3,8 @@
 
 use super::graph::{Graph, GraphError};
 use super::op::Op;
-use super::op_facts::LEFT;
-use super::problem::{CORRECTS, Problem};
-use super::spec::{KEY, KNOWN_VERSIONS, LEFT_MEANINGS, LEFT_TABLE, MAX_OPS, MEANINGS, TABLES, VERSION};
+use super::problem::Problem;
+use super::spec::{KEY, KNOWN_VERSIONS, MAX_OPS, MEANINGS, TABLES, VERSION};
 use serde::de::{Deserializer, MapAccess, Visitor};
 use serde::{Deserialize, Serialize};
 use serde_json::value::RawValue;
@@ -153,9 +152,7 @@ pub(super) fn parse<'a>(
 fn check_fields(document: &Document<'_>, problems: &mut Vec<Problem>) {
     let mut fault = |text: String| problems.push(Problem::Document(text));
     let meaning = &document.output.meaning;
-    if LEFT_MEANINGS.contains(&meaning.as_str()) {
-        fault(format!("output meaning `{meaning}` was removed: {CORRECTS}"));
-    } else if !MEANINGS.contains(&meaning.as_str()) {
+    if !MEANINGS.contains(&meaning.as_str()) {
         fault(format!("output meaning `{meaning}` is unknown; known: {}", MEANINGS.join(", ")));
     }
     if !(1..=64).contains(&document.cell) {
@@ -177,10 +174,7 @@ fn check_inputs(document: &mut Document<'_>, problems: &mut Vec<Problem>) {
     let Some(table) = TABLES.iter().find(|t| t.name == name && u64::from(t.version) == *version) else {
         let mut known: Vec<_> = TABLES.iter().map(|t| t.name).collect();
         known.dedup();
-        problems.push(Problem::Document(match name.as_str() {
-            LEFT_TABLE => format!("feature table `{name}` was removed: {CORRECTS}"),
-            _ => format!("feature table `{name}` is unknown; known: {}", known.join(", ")),
-        }));
+        problems.push(Problem::Document(format!("feature table `{name}` is unknown; known: {}", known.join(", "))));
         return;
     };
     if document.inputs.is_empty() {
@@ -313,11 +307,7 @@ fn operator(index: usize, text: &str, problems: &mut Vec<Problem>) -> Option<Op>
         Some(Ok(op)) => Some(op),
         Some(Err(e)) => fault(plain(&e)),
         None => {
-            let left = LEFT.contains(&kind.as_str());
-            problems.push(match left {
-                true => Problem::OperatorLeft { index, name, op: kind },
-                false => Problem::UnknownOperator { index, name, op: kind },
-            });
+            problems.push(Problem::UnknownOperator { index, name, op: kind });
             None
         }
     }

@@ -20,9 +20,6 @@ pub const KINDS: [&str; 12] = [
     "dropout",
 ];
 
-/// Operators that have left, as files spelt them: no shipped and no published network has one.
-pub const LEFT: [&str; 2] = ["pixel_shuffle", "pixel_unshuffle"];
-
 impl Op {
     /// The operator `kind` from its fields (without `op`); `None` for a kind that is not in
     /// [`KINDS`].

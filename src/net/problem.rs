@@ -16,12 +16,6 @@ pub enum WeightsError {
         /// Reason.
         source: std::io::Error,
     },
-    /// A shipped network that was removed.
-    #[error("the network `{name}` was removed: {}; the shipped one is `filter`", CORRECTS)]
-    Left {
-        /// What it was called.
-        name: &'static str,
-    },
     /// The path is a folder, a pipe or a device.
     #[error("weights file {} is not a file; name a .safetensors file", path.display())]
     NotAFile {
@@ -64,10 +58,6 @@ pub enum WeightsError {
     },
 }
 
-/// What is said of networks that answer light, or correct that of `gather`.
-pub const CORRECTS: &str =
-    "nothing runs networks that answer light; method `neural` runs those that guide a filter (table `cells`)";
-
 /// Faults as lines, the first forty of them.
 pub fn list(problems: &[Problem]) -> String {
     const SHOWN: usize = 40;
@@ -97,16 +87,6 @@ pub enum Problem {
     /// An operator that this program does not know.
     #[error("graph[{index}] `{name}`: operator `{op}` is unknown; a newer program may run it")]
     UnknownOperator {
-        /// Position in the graph.
-        index: usize,
-        /// The operator's name, or `?`.
-        name: String,
-        /// Its kind.
-        op: String,
-    },
-    /// An operator that was removed.
-    #[error("graph[{index}] `{name}`: operator `{op}` was removed, since no shipped and no published network has it")]
-    OperatorLeft {
         /// Position in the graph.
         index: usize,
         /// The operator's name, or `?`.
@@ -249,7 +229,7 @@ impl Problem {
         match self {
             Problem::Document(_) => "document",
             Problem::Version { .. } => "version",
-            Problem::UnknownOperator { .. } | Problem::OperatorLeft { .. } => "unknown-operator",
+            Problem::UnknownOperator { .. } => "unknown-operator",
             Problem::Operator { .. } => "operator",
             Problem::Graph(_) => "graph",
             Problem::Feature { .. } => "feature",
@@ -272,9 +252,7 @@ impl Problem {
         match self {
             Problem::Document(_) | Problem::Trailing { .. } => "",
             Problem::Version { what, .. } => what,
-            Problem::UnknownOperator { name, .. }
-            | Problem::OperatorLeft { name, .. }
-            | Problem::Operator { name, .. } => name,
+            Problem::UnknownOperator { name, .. } | Problem::Operator { name, .. } => name,
             Problem::Graph(error) => error.op(),
             Problem::Feature { feature, .. } => feature,
             Problem::Missing { tensor }
@@ -301,7 +279,6 @@ impl WeightsError {
         match self {
             WeightsError::Io { .. } => one("io"),
             WeightsError::NotAFile { .. } => one("not-a-file"),
-            WeightsError::Left { .. } => one("left"),
             WeightsError::TooLarge { .. } => one("too-large"),
             WeightsError::NotSafetensors { .. } => one("not-safetensors"),
             WeightsError::Truncated { .. } => one("truncated"),

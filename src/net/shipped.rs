@@ -25,7 +25,6 @@ impl Weights {
     pub fn find(path: Option<&Path>) -> Result<Self, WeightsError> {
         let shipped = |path: &&Path| path.to_str() == Some(NAME) && !path.exists();
         match path.filter(|path| !shipped(path)) {
-            Some(path) if path.to_str() == Some("small") && !path.exists() => Err(WeightsError::Left { name: "small" }),
             Some(path) => Self::load(path),
             None => Self::shipped(),
         }

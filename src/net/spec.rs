@@ -19,10 +19,6 @@ pub const SCALE_SUFFIX: &str = "_scale";
 pub const MAX_SCALE: f32 = f32::MAX / 128.0;
 /// Meanings of the output that exist. `plain` is for tests: numbers without a unit.
 pub const MEANINGS: &[&str] = &["filter", "display_signed", "plain"];
-/// Meanings, and a table, of networks that correct, which have left.
-pub(super) const LEFT_MEANINGS: &[&str] =
-    &["log_irradiance_over_exposure", "gain_and_rest_on_guess", "gain_and_rest_on_cache"];
-pub(super) const LEFT_TABLE: &str = "screen";
 
 /// One row of a feature table.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -162,14 +162,7 @@ fn documents() {
     one(&["version 3", "up to version 2"], set("/version", json!(3)));
     one(&["table `cells`", "version 7"], set("/table/version", json!(7)));
     one(&["table `probe` is unknown"], set("/table/name", json!("probe")));
-    // What was removed says so.
-    one(&["table `screen` was removed", "`neural`", "guide a filter"], set("/table/name", json!("screen")));
-    for meaning in ["log_irradiance_over_exposure", "gain_and_rest_on_guess", "gain_and_rest_on_cache"] {
-        one(&[meaning, "was removed", "guide a filter"], move |f| f.document["output"]["meaning"] = json!(meaning));
-    }
-    for kind in ["pixel_shuffle", "pixel_unshuffle"] {
-        one(&["`b`", kind, "was removed"], move |f| f.document["graph"][1]["op"] = json!(kind));
-    }
+    one(&["`b`", "`pixel_shuffle` is unknown"], set("/graph/1/op", json!("pixel_shuffle")));
     one(&["`glow`", "no such feature"], set("/inputs/0/name", json!("glow")));
     one(&["`normal`", "3 channels"], |f| {
         f.document["inputs"] = json!([{"name": "normal", "channels": 4}]);

@@ -14,8 +14,9 @@ import torch
 
 sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), ".."))
 from bouncelight_training.errors import TrainingError  # noqa: E402
-from bouncelight_training.filter import ablation, blur, export, samples, scene, train  # noqa: E402
+from bouncelight_training.filter import blur, export, samples, train  # noqa: E402
 
+SHIPPED = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "..", "assets", "weights", "filter.safetensors")
 PROGRAM = os.environ.get("BOUNCELIGHT")
 SIZE = ["--size", "96x64", "--spp", "4", "-q"]
 
@@ -85,29 +86,10 @@ class WithTheProgram(unittest.TestCase):
             with self.assertRaisesRegex(TrainingError, "training and validation"):
                 train.train(train.Config(train=os.path.join(folder, "a"), validation=os.path.join(folder, "a")), os.path.join(folder, "other"))
 
-    def test_a_network_is_fitted_to_one_scene(self):
-        with tempfile.TemporaryDirectory() as folder:
-            out = os.path.join(folder, "mine.safetensors")
-            told = scene.fit(PROGRAM, "cornell", out, folder, views=2, spp=4, minutes=0.1, size="96x64", lit=["--environment", "0.2"])
-            self.assertEqual((told["views"], told["held_out_error"]["columns"]), (2, ["gather", "before", "after"]))
-            gather, before, _ = told["held_out_error"]["all"]
-            # It began with the shipped network, which is not `gather`, took steps, and kept what did best on the views for choosing. Whether
-            # six seconds lead to something better is not asked: on a slow machine they are one step.
-            self.assertNotEqual(gather, before)
-            state = train.read_checkpoint(os.path.join(folder, "run", "checkpoint.pt"))
-            errors = [row["validation_error"] for row in state["rows"]]
-            self.assertEqual(state["best"][0], min(errors))
-            start = train.network_of(scene.SHIPPED)
-            learnt = lambda weights: any(not torch.equal(weights[k], v) for k, v in start.state_dict().items())
-            self.assertTrue(learnt(state["average"]))
-            self.assertEqual(learnt(state["best"][1]), errors.index(min(errors)) > 0)
-            info = subprocess.run([PROGRAM, "weights", "verify", out], capture_output=True, text=True)
-            self.assertEqual(info.returncode, 0, info.stderr)
-
 
 class Alone(unittest.TestCase):
     def test_what_cannot_be_begun_with_is_named(self):
-        other = os.path.join(os.path.dirname(scene.SHIPPED), "..", "..", "weights-format", "fixtures", "add.safetensors")
+        other = os.path.join(os.path.dirname(SHIPPED), "..", "..", "weights-format", "fixtures", "add.safetensors")
         with self.assertRaisesRegex(TrainingError, "cannot begin with it"):
             train.network_of("none.safetensors")
         with self.assertRaisesRegex(TrainingError, "does not filter"):
@@ -141,28 +123,10 @@ class Alone(unittest.TestCase):
             run.train_step(piles, 0.0)
             return torch.cat([p.grad.flatten() for p in run.model.parameters()])
 
-        alone, taught = slope(), slope(teacher=scene.SHIPPED, taught=1.0)
+        alone, taught = slope(), slope(teacher=SHIPPED, taught=1.0)
         self.assertGreater((alone - taught).abs().max(), 1e-4)
         # Negative control: one that counts for nothing.
-        self.assertTrue(torch.equal(slope(teacher=scene.SHIPPED, taught=0.0), alone))
-
-    def test_each_part_is_left_out_once(self):
-        base = train.Config(train="a", validation="b")
-        runs = dict(ablation.variants(base))
-        for name, _ in samples.TABLE:
-            kept = train.kept_channels(runs[f"no {name}"]).flatten()
-            missing = [other for other, n in samples.TABLE for _ in range(n)]
-            self.assertEqual({m for m, k in zip(missing, kept) if not k}, {name})
-        for part, place in blur.PARTS.items():
-            kept = train.kept_parts(runs[f"answer without {part}"])
-            self.assertEqual(kept[:, place].abs().sum().item(), 0)
-            self.assertEqual(kept.sum().item(), sum(p.stop - p.start for p in blur.PARTS.values()) - (place.stop - place.start))
-        self.assertEqual({p for p in base.pools for name, c in runs.items() if name == f"loss without {p}x{p} cells" and p not in c.pools}, set(base.pools))
-        # All parts, but for chance: the seeds differ, and what is worth nothing is told from what is worth something by that.
-        alike = [c for name, c in runs.items() if name.startswith("all")]
-        self.assertEqual((len({c.seed for c in alike}), {c.without for c in alike}), (ablation.SEEDS, {()}))
-        rows = [(name, 0.1, 0.05) for name in ("all, seed 1", "all, seed 2", "all, seed 3")] + [("no light", 0.1, 0.06)]
-        self.assertIn("| no light | 10.000 | 6.000 | +1.000 |", ablation.table(rows))
+        self.assertTrue(torch.equal(slope(teacher=SHIPPED, taught=0.0), alone))
 
     def made_up(self, moments):
         """Samples of a plane, 24x24 cells: (name, when, age, light [3,h,w] and target)."""
@@ -189,7 +153,7 @@ class Alone(unittest.TestCase):
         still, = self.made_up([("a", "4", 4, noisy[0], flat), ("a", "5", 5, noisy[0], flat)])
         restless, = self.made_up([("a", "4", 4, noisy[0], flat), ("a", "5", 5, noisy[1], flat)])
         model = train.network(train.Config(widths=(4, 8)))
-        one = lambda pile: train.changes(model, [pile], 1, torch.ones(1, blur.GUIDANCE, 1, 1))["change gather"]
+        one = lambda pile: train.changes(model, [pile])["change gather"]
         # The frame before counts for less than the one after, whose age is greater: nothing else differs.
         self.assertLess(one(still), 0.01)
         self.assertGreater(one(restless), 0.05)
@@ -206,7 +170,7 @@ class Alone(unittest.TestCase):
 
         self.assertGreater((slope(10.0) - slope(0.0)).abs().max(), 1e-3)
         quiet = self.made_up([("a", "4", 4, noisy[0], flat), ("b", "5", 5, noisy[1], flat)])
-        self.assertEqual(train.changes(model, quiet, 1, 1), {})
+        self.assertEqual(train.changes(model, quiet), {})
 
     def test_a_step_without_a_gradient_teaches_nothing_and_many_end_the_run(self):
         flat = np.ones((3, 24, 24), np.float32)

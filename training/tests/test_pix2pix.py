@@ -275,8 +275,8 @@ class Toy(unittest.TestCase):
         self.assertEqual(sorted(os.listdir(out)), ["cornell000.npz", "cornell001.npz"])
         for name in os.listdir(out):
             pictures, _ = views.read(os.path.join(out, name))
-            # In a box that is shut on all sides but one, most pixels have a colour, light and a place.
-            for part in ("diffuse", "target", "gathered", "normal"):
+            # In a box that is shut on all sides but one, many pixels have a colour and light.
+            for part in ("diffuse", "target", "gathered"):
                 self.assertGreater((pictures[part].max(-1) > 0).mean(), 0.3, (name, part))
 
     @unittest.skipUnless(PROGRAM, "SKIP: BOUNCELIGHT does not name the program")

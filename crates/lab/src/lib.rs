@@ -6,12 +6,10 @@
 //! - [`study`]: error against time, stability, the cheapest method that is good enough, this device.
 //! - [`count`]: shaders that count what they do.
 //! - [`scenes`]: scenes made by code in any number: the paper's rooms, homes.
-//! - [`labels`]: labels of passes that earlier versions wrote.
 //! - [`export`]: the pass for hosts without wgpu.
 
 pub mod count;
 pub mod export;
-pub mod labels;
 #[cfg(test)]
 mod layouts;
 pub mod metrics;

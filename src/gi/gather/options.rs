@@ -111,9 +111,6 @@ impl Options {
     }
 }
 
-/// Words of earlier versions and what they are called now.
-const RENAMED: [(&str, &str); 2] = [("even", "progressive"), ("first_rounds", "first_updates")];
-
 /// Why a list of numbers cannot be read.
 #[derive(Debug, Error, PartialEq)]
 pub enum OptionsError {
@@ -144,8 +141,6 @@ impl FromStr for Options {
             let value = if name == "rays" && value == "all" { "1" } else { value };
             let number: f32 = value.parse().map_err(|_| wrong("is no number"))?;
             let at_least_one = if number >= 1.0 { Ok(number) } else { Err(wrong("must be at least 1")) };
-            // Files of `fit` hold such words: those of earlier versions are read on.
-            let name = RENAMED.iter().find(|(old, _)| *old == name).map_or(name, |(_, new)| new);
             match name {
                 "cell_frames" => options.cell_frames = at_least_one?,
                 "entry_frames" => options.entry_frames = at_least_one?,

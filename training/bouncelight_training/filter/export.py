@@ -7,13 +7,11 @@ import datetime
 import json
 import os
 
-import torch
-
 from ..errors import TrainingError, reported
 from ..model import parameter_count
 from ..weights import GraphNet, WeightsError, document, verify, write
 from . import blur, samples
-from .train import MEANING, Config, kept_parts, read_checkpoint
+from .train import MEANING, Config, read_checkpoint
 
 
 def export(run, out, name=""):
@@ -23,17 +21,6 @@ def export(run, out, name=""):
     error, average = state["best"]
     model = GraphNet(state["graph"], state["output"])
     model.load_state_dict(average)
-    # A feature that the run left out has no weight.
-    first = model.get_submodule(model.graph[0]["name"])
-    names = [feature for feature, n in samples.TABLE for _ in range(n)]
-    with torch.no_grad():
-        for channel, feature in enumerate(names):
-            if feature in config.without:
-                first.weight[:, channel] = 0
-        # Nor has what is no part of the answer.
-        last, kept = model.get_submodule(model.graph[-1]["name"]), kept_parts(config).cpu().view(-1)
-        last.weight *= kept.view(-1, 1, 1, 1)
-        last.bias *= kept
     model.eval()
     words = [f"--{k} {','.join(map(str, v)) if isinstance(v, tuple) else v}" for k, v in vars(config).items() if v != getattr(Config(), k) and k not in ("train", "validation")]
     folders = ",".join(os.path.basename(os.path.normpath(f)) for f in config.train.split(","))

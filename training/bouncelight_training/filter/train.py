@@ -52,10 +52,8 @@ class Config:
     teacher: str = ""  # weights file of a network of any shape whose filtered light is learnt, too
     taught: float = 0.5  # what that light counts; the rest is the target
     widths: tuple = (12, 24, 32, 48)
-    without: tuple = ()  # features of the table that are zeroed, for ablations
-    mute: tuple = ()  # parts of the answer that are zeroed, for ablations: near, far, trust, tolerance
     pools: tuple = POOLS  # sides of the squares of cells that the loss compares
-    every: int = 1  # one view of so many, for ablations
+    every: int = 1  # one view of so many
     minutes: float = 20.0
     steps: int = 0  # so many in place of minutes, so that runs on a busy machine are alike
     batch: int = 4
@@ -98,25 +96,6 @@ def network_of(path):
     except (OSError, WeightsError, RuntimeError) as error:
         raise TrainingError(f"{path}: cannot begin with it: {error}") from error
     return model
-
-
-def kept_channels(config):
-    """1 for channels that the network is given, else 0: [1,15,1,1]."""
-    unknown = set(config.without) - {name for name, _ in samples.TABLE}
-    if unknown:
-        raise TrainingError(f"no such feature: {sorted(unknown)[0]}")
-    return torch.tensor([float(name not in config.without) for name, n in samples.TABLE for _ in range(n)], device=config.device).view(1, -1, 1, 1)
-
-
-def kept_parts(config):
-    """1 for numbers of an answer that count, else 0: [1,12,1,1]."""
-    unknown = set(config.mute) - set(blur.PARTS)
-    if unknown:
-        raise TrainingError(f"no such part of an answer: {sorted(unknown)[0]}")
-    kept = torch.zeros(1, blur.GUIDANCE, 1, 1, device=config.device)
-    for part, place in blur.PARTS.items():
-        kept[:, place] = float(part not in config.mute)
-    return kept
 
 
 def loss_of(shown, target, mask, mean, noise, pools=POOLS):
@@ -181,14 +160,14 @@ def in_parts(pile, size=16):
         yield [pile.samples[i] for i in numbers], pile.taken(list(numbers))
 
 
-def validate(model, piles, channels, parts):
+def validate(model, piles):
     """Error of `gather`'s light and of the network's, by moment, and over all: of each cell, as finished pictures are judged by blocks of 4x4 pixels.
     It holds the target's noise."""
     sums = {}
     with torch.no_grad():
         for some, batch in (part for pile in piles for part in in_parts(pile)):
             mean = batch["mean"].view(-1, 1, 1, 1)
-            for which, answer in (("gather", None), ("network", model(batch["features"] * channels) * parts)):
+            for which, answer in (("gather", None), ("network", model(batch["features"]))):
                 shown = blur.filtered(batch, answer)[0].clamp(min=0) / mean
                 errors = [pooled_error(shown[i:i + 1], batch["target"][i:i + 1] / mean[i], batch["mask"][i:i + 1], 1) for i in range(len(some))]
                 for sample, (off, light) in zip(some, errors):
@@ -198,7 +177,7 @@ def validate(model, piles, channels, parts):
     return {f"{key} {which}": off / max(light, 1e-20) for (key, which), (off, light) in sums.items()}
 
 
-def changes(model, piles, channels, parts):
+def changes(model, piles):
     """Mean |change| of the light from one frame of a still camera to the next over mean light, of `gather` and of the network; empty without such frames."""
     sums = {}
     with torch.no_grad():
@@ -206,7 +185,7 @@ def changes(model, piles, channels, parts):
             for i in np.flatnonzero(pile.later >= 0):
                 batch = pile.taken([i, pile.later[i]])
                 mask = batch["mask"][:1].unsqueeze(1)
-                for which, answer in (("gather", None), ("network", model(batch["features"] * channels) * parts)):
+                for which, answer in (("gather", None), ("network", model(batch["features"]))):
                     shown = blur.filtered(batch, answer)[0].clamp(min=0)
                     a, b = sums.get(which, (0, 0))
                     sums[which] = (a + ((shown[1:] - shown[:1]).abs() * mask).sum().item(), b + (shown[:1] * mask).sum().item())
@@ -218,7 +197,7 @@ class Run:
 
     def __init__(self, config, folder):
         self.config, self.folder = config, folder
-        self.model, self.channels, self.parts = network(config).to(config.device), kept_channels(config), kept_parts(config)
+        self.model = network(config).to(config.device)
         self.average = {k: v.detach().clone() for k, v in self.model.state_dict().items()}
         self.optimiser = torch.optim.AdamW(self.model.parameters(), lr=config.learning_rate, weight_decay=config.weight_decay)
         self.step, self.seconds, self.rows, self.best = 0, 0.0, [], (float("inf"), None)
@@ -272,7 +251,7 @@ class Run:
         # Beside each its next frame, if there is one.
         followed = np.flatnonzero(pile.later[chosen] >= 0) if c.flicker else []
         batch = augmented(pile.taken(np.concatenate([chosen, pile.later[chosen[followed]]]), window(pile, c.crop, rng)), rng)
-        answer = self.model(batch["features"] * self.channels) * self.parts
+        answer = self.model(batch["features"])
         shown, first = blur.filtered(batch, answer)
         learnt = [batch[k] for k in ("target", "mask", "mean", "noise")]
         loss = (1 - c.raw) * loss_of(shown, *learnt, c.pools) + c.raw * loss_of(first, *learnt, c.pools)
@@ -304,15 +283,15 @@ def read_checkpoint(path):
         raise TrainingError(f"{path}: not a readable checkpoint: {error}") from error
 
 
-def piles_of(config, same_names=False):
-    """What is learnt and what is held out. Views of the same name are the same view, unless `same_names` are meant to be allowed."""
+def piles_of(config):
+    """What is learnt and what is held out. Views of the same name are the same view."""
     torch.set_num_threads(config.threads)
     # What a teacher says has no noise.
     most = samples.MOST_NOISE / max(1 - config.taught, 1e-6) if config.teacher else samples.MOST_NOISE
     views = [sample for name in config.train.split(",") for sample in samples.read(name, config.every, most)]
     held_out = samples.read(config.validation)
     shared = {v.name for v in views} & {v.name for v in held_out}
-    if shared and not same_names:
+    if shared:
         raise TrainingError(f"{sorted(shared)[0]} stands in training and validation")
     return samples.piles(views, config.device), samples.piles(held_out, config.device)
 
@@ -356,9 +335,9 @@ def based(piles, pools):
                 pile.fields["change"][followed] = change_of(shown[followed], shown[pile.later[followed]], batch, pools)
 
 
-def train(config, folder, same_names=False, read=None):
-    """Runs to the end; returns the Run. `read`: what `piles_of` has read already."""
-    piles, held_out = read or piles_of(config, same_names)
+def train(config, folder):
+    """Runs to the end; returns the Run."""
+    piles, held_out = piles_of(config)
     os.makedirs(folder, exist_ok=True)
     run = Run(config, folder)
     run.load()
@@ -389,7 +368,7 @@ def train(config, folder, same_names=False, read=None):
 
 def note(run, held_out, loss, rate):
     """Validates the averaged network, keeps it if it is the best, adds a row to the log."""
-    errors = validate(run.averaged(), held_out, run.channels, run.parts) | changes(run.averaged(), held_out, run.channels, run.parts)
+    errors = validate(run.averaged(), held_out) | changes(run.averaged(), held_out)
     if errors["all network"] < run.best[0]:
         run.best = (errors["all network"], {k: v.clone() for k, v in run.average.items()})
     run.rows.append({"step": run.step, "samples": run.step * run.config.batch, "seconds": round(run.seconds, 1), "learning_rate": rate,
@@ -402,13 +381,13 @@ def note(run, held_out, loss, rate):
     print(f"step {run.step} {run.seconds:.0f} s loss {loss:.4f} " + " ".join(f"{k} {v:.2%}" for k, v in errors.items()), file=sys.stderr, flush=True)
 
 
-def asked(description, arguments):
-    """What a command line asks for: (Config, folder of the run)."""
-    parser = argparse.ArgumentParser(description=description, formatter_class=argparse.RawDescriptionHelpFormatter)
+@reported
+def main(arguments=None):
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--run", required=True, help="folder of the run; continued if it has a checkpoint")
     for field in dataclasses.fields(Config):
-        numbers, words = lambda t: tuple(int(n) for n in t.split(",")), lambda t: tuple(t.split(","))
-        kind = {"widths": numbers, "pools": numbers, "without": words, "mute": words}.get(field.name, type(field.default))
+        numbers = lambda t: tuple(int(n) for n in t.split(","))
+        kind = numbers if field.name in ("widths", "pools") else type(field.default)
         parser.add_argument("--" + field.name, type=kind, default=field.default, help=f"default {field.default}")
     a = vars(parser.parse_args(arguments))
     folder = a.pop("run")
@@ -416,12 +395,7 @@ def asked(description, arguments):
     for name in ("train", "validation"):
         if not getattr(config, name):
             raise TrainingError(f"--{name} is missing: a folder that bouncelight dataset --moments has written")
-    return config, folder
-
-
-@reported
-def main(arguments=None):
-    train(*asked(__doc__, arguments))
+    train(config, folder)
 
 
 if __name__ == "__main__":

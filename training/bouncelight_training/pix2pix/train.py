@@ -71,7 +71,7 @@ class Config:
 # What may differ between a run's first command and the one that continues it.
 FREE = {"views", "threads", "device", "checkpoint_seconds"}
 # What may differ, too, once the run is at its end: it goes on, the learning rate rises and falls again.
-FURTHER = {"steps", "whole", "learning_rate"}
+AT_THE_END = {"steps", "whole", "learning_rate"}
 
 
 def load(module, tensors):
@@ -135,7 +135,7 @@ class Run:
             return
         state = read_checkpoint(self.checkpoint_path)
         ours = dataclasses.asdict(self.config)
-        free = FREE | FURTHER if state["step"] >= state["config"]["steps"] else FREE
+        free = FREE | AT_THE_END if state["step"] >= state["config"]["steps"] else FREE
         differ = [k for k in ours if k not in free and ours[k] != state["config"].get(k)]
         if differ:
             raise TrainingError(f"{self.checkpoint_path} was made with another {differ[0]} ({state['config'].get(differ[0])}, now {ours[differ[0]]}); use another --run")

@@ -3,7 +3,7 @@
 import numpy as np
 
 from . import graph as graphs
-from .operators import LEFT, OPERATORS, U32, operator_schemas, scaled_axis, tensors
+from .operators import OPERATORS, U32, operator_schemas, scaled_axis, tensors
 from .problems import Problem
 
 VERSION = 2
@@ -11,9 +11,6 @@ KNOWN_VERSIONS = (1, 2)
 KEY = "bouncelight"
 MAX_OPS = 1024
 MEANINGS = ("filter", "display_signed", "plain")
-# Meanings, and a table, of networks that correct, which have left, and what is said of them.
-LEFT_MEANINGS, LEFT_TABLE = ("log_irradiance_over_exposure", "gain_and_rest_on_guess", "gain_and_rest_on_cache"), "screen"
-CORRECTS = "nothing runs networks that answer light; method `neural` runs those that guide a filter (table `cells`)"
 _PICTURE = ("signed", "signed_stretched", "unit")
 # Feature: (channels, encodings); files of version 1 mean the first encoding.
 CELLS_V2 = {
@@ -79,9 +76,7 @@ def check(doc):
     def fault(sentence):
         problems.append(Problem("document", "", f"metadata `{KEY}`: {sentence}"))
 
-    if doc["output"]["meaning"] in LEFT_MEANINGS:
-        fault(f"output meaning `{doc['output']['meaning']}` was removed: {CORRECTS}")
-    elif doc["output"]["meaning"] not in MEANINGS:
+    if doc["output"]["meaning"] not in MEANINGS:
         fault(f"output meaning `{doc['output']['meaning']}` is unknown; known: {', '.join(MEANINGS)}")
     if not 1 <= doc["cell"] <= 64:
         fault(f"cell is {doc['cell']}, allowed are 1 to 64")
@@ -116,8 +111,6 @@ def _operator(index, op):
     name = op["name"] if isinstance(op, dict) and _text(op.get("name")) else "?"
     if not isinstance(op, dict) or not _text(op.get("op")):
         return [Problem("operator", name, f"graph[{index}] `{name}`: field `op` is missing or no string, or a field stands twice")]
-    if op["op"] in LEFT:
-        return [Problem("unknown-operator", name, f"graph[{index}] `{name}`: operator `{op['op']}` was removed, since no shipped and no published network has it")]
     if op["op"] not in OPERATORS:
         return [Problem("unknown-operator", name, f"graph[{index}] `{name}`: operator `{op['op']}` is unknown; a newer program may run it")]
     wrong = graphs.field_fault(op)
@@ -132,8 +125,7 @@ def _inputs(doc):
         known = "1" if newest == 1 else f"1 to {newest}"
         return [Problem("version", f"feature table `{name}`", f"feature table `{name}` has version {version}; known: {known}")]
     if name not in TABLES:
-        why = f"was removed: {CORRECTS}" if name == LEFT_TABLE else f"is unknown; known: {', '.join(TABLES)}"
-        return [Problem("document", "", f"metadata `{KEY}`: feature table `{name}` {why}")]
+        return [Problem("document", "", f"metadata `{KEY}`: feature table `{name}` is unknown; known: {', '.join(TABLES)}")]
     problems = [] if doc["inputs"] else [Problem("document", "", f"metadata `{KEY}`: there is no input feature")]
     rows, ordered = TABLES[name]
     rows = OLDER_TABLES.get((name, version), rows)

@@ -127,8 +127,6 @@ OPERATORS = {
     "activation": {**_ONE, "activation": (ACTIVATION, REQUIRED)},
     "dropout": {**_ONE, "p": (Fraction(0, 1, open_high=True), REQUIRED)},
 }
-# Operators that have left.
-LEFT = ("pixel_shuffle", "pixel_unshuffle")
 NORMS = ("batch_norm", "instance_norm", "group_norm")
 
 

@@ -152,19 +152,10 @@ impl Global {
     }
 }
 
-/// Methods that there were.
-const REPLACED: [&str; 3] = ["rsm", "cache", "probes"];
-
-/// What is said to who asks for one of them.
-pub fn replaced(text: &str) -> Option<String> {
-    REPLACED.contains(&text).then(|| format!("method `{text}` was replaced by `gather`"))
-}
-
 /// What is said to who asks for paths where frames are drawn.
 pub const TRACED: &str = "paths are traced by `bouncelight trace`, a command of its own";
 
-/// Parses the name of a method of which the function is true, and says where to look for others that there are or
-/// were.
+/// Parses the name of a method of which the function is true, and says where paths are traced.
 #[derive(Debug, Clone)]
 pub struct MethodParser(pub fn(&MethodName) -> bool);
 
@@ -179,9 +170,6 @@ impl TypedValueParser for MethodParser {
     fn parse_ref(&self, cmd: &Command, arg: Option<&Arg>, value: &OsStr) -> Result<MethodName, clap::Error> {
         let error = |reason: String| clap::Error::raw(ErrorKind::InvalidValue, reason).with_cmd(cmd);
         let asked = value.to_str().unwrap_or_default();
-        if let Some(reason) = replaced(asked) {
-            return Err(error(reason));
-        }
         if asked == MethodName::Reference.name() && !(self.0)(&MethodName::Reference) {
             return Err(error(TRACED.into()));
         }

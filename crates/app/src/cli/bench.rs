@@ -3,7 +3,7 @@
 
 use super::stdout::say;
 use super::{
-    args::{Global, MethodName, PrecisionName, real_time, replaced, usage},
+    args::{Global, MethodName, PrecisionName, real_time, usage},
     error::CliError,
     record,
     scene_args::SceneArgs,
@@ -76,7 +76,6 @@ fn parse_methods(text: &str) -> Result<Methods, String> {
     match text {
         "all" => Ok(Methods(MethodName::LIGHT.to_vec())),
         "reference" => Err("bench measures frames of real-time methods; `bouncelight trace` tells its speed".into()),
-        one if replaced(one).is_some() => Err(replaced(one).unwrap_or_default()),
         one => match MethodName::from_name(one) {
             Some(method) => Ok(Methods(vec![method])),
             None => Err(format!("invalid variant: {one}")),

@@ -114,7 +114,7 @@ fn parse_method(text: &str) -> Result<Option<MethodName>, String> {
         Some(name) => Ok(Some(name)),
         None => {
             let known: Vec<&str> = MethodName::REAL_TIME.iter().map(|m| m.name()).collect();
-            Err(super::args::replaced(text).unwrap_or_else(|| format!("there are all, {}", known.join(", "))))
+            Err(format!("there are all, {}", known.join(", ")))
         }
     }
 }

@@ -47,9 +47,6 @@ pub struct Args {
     /// Network to try besides the shipped ones; repeatable.
     #[arg(long, value_name = "FILE", help_heading = CHOICE)]
     weights: Vec<PathBuf>,
-    /// Has left; whoever asks for it is told what there is instead.
-    #[arg(long, hide = true, num_args = 0..=1, default_missing_value = "", value_parser = learning_has_left)]
-    learn: Option<String>,
     /// Most samples a pixel of a reference, 2 or more.
     #[arg(long, default_value_t = 1024, value_name = "N", value_parser = clap::value_parser!(u32).range(2..),
         help_heading = CHOICE)]
@@ -87,12 +84,6 @@ enum Cost {
 
 fn parse_budget(text: &str) -> Result<f64, String> {
     number(text, |ms: f64| ms.is_finite() && ms >= 0.0, "a budget is 0 or more milliseconds")
-}
-
-fn learning_has_left(_: &str) -> Result<String, String> {
-    Err("`fit` no longer learns on the device; `python -m bouncelight_training.filter.scene` fine-tunes the shipped \
-         network to a scene (training/README.md), and `fit --weights FILE` tries what comes of it"
-        .into())
 }
 
 pub fn run(global: &Global, args: Args) -> Result<()> {

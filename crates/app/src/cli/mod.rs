@@ -120,10 +120,6 @@ pub fn main() -> ExitCode {
     let cli = match Cli::try_parse() {
         Ok(cli) => cli,
         Err(e) => {
-            if let Some((old, new)) = renamed(&e) {
-                eprintln!("error: `{old}` was renamed to `{new}`");
-                return ExitCode::from(error::USAGE);
-            }
             // Help and version are results; everything else is a usage error, which clap also exits
             // with 2 for.
             let _ = e.print();
@@ -174,16 +170,6 @@ Examples:
   bouncelight doctor
 
 `bouncelight COMMAND --help` lists a command's options; docs/guide/cli.md explains them by task.";
-
-/// Options of earlier versions and what they are called now.
-const RENAMED: [(&str, &str); 3] =
-    [("--gi-frames", "--accumulate"), ("--most-samples", "--max-samples"), ("--unseen", "--ambient-term")];
-
-/// The old and the new spelling, where a command was given an option of an earlier version.
-fn renamed(e: &clap::Error) -> Option<(&'static str, &'static str)> {
-    let Some(ContextValue::String(flag)) = e.get(ContextKind::InvalidArg) else { return None };
-    RENAMED.into_iter().find(|(old, _)| e.kind() == ErrorKind::UnknownArgument && old == flag)
-}
 
 /// The flag that a command does not know, where it is one of paths and of no frame.
 fn only_of_trace(e: &clap::Error) -> Option<&str> {

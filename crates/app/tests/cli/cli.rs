@@ -41,8 +41,8 @@ fn usage_errors_exit_with_2() {
     fails(&with(["neural", "--weights", "generator"]), 2, &["generator: weights of table `images`", "filter's"]);
     fails(&with(["generator", "--weights", "filter"]), 2, &["filter: weights of table `cells`", "generator's"]);
     for method in ["rsm", "cache", "probes"] {
-        fails(&["render", "interior", "-o", &out, "--method", method], 2, &[method, "replaced by `gather`"]);
-        fails(&["bench", "interior", "--method", method], 2, &[method, "replaced by `gather`"]);
+        fails(&["render", "interior", "-o", &out, "--method", method], 2, &[method, "gather"]);
+        fails(&["bench", "interior", "--method", method], 2, &[method]);
     }
     let samples = ["dataset", "--spp", "2", "--moments", "1", "--out", &path(&dir, "d"), "--rooms"];
     fails(&[&samples[..], &["5-47"]].concat(), 2, &["judging", "47"]);
@@ -424,44 +424,23 @@ fn the_shipped_network_has_a_name() {
     fails(&["weights", "verify", "filt"], 4, &["filt"]);
 }
 
-/// Networks that correct, and operators that nobody uses, have left: files that have them are
-/// refused by name.
+/// Files that name what this program does not know are refused.
 #[test]
-fn what_has_left_is_named() {
+fn unknown_names_are_named() {
     let dir = tempfile::tempdir().unwrap();
     let out = path(&dir, "out.png");
-    for command in [&["weights", "verify", "small"][..], &["render", "cornell", "-o", &out, "--weights", "small"]] {
-        fails(command, 4, &["`small` was removed", "`filter`"]);
-    }
     let bad = |name: &str| {
         format!("{}/weights-format/fixtures/bad/{name}.safetensors", concat!(env!("CARGO_MANIFEST_DIR"), "/../.."))
     };
     for (name, words) in [
-        ("operator_left", &["`n`", "`pixel_shuffle` was removed"]),
-        ("meaning_left", &["`gain_and_rest_on_guess` was removed", "`neural`"]),
-        ("table_left", &["`screen` was removed", "`neural`"]),
+        ("operator_left", &["`n`", "`pixel_shuffle` is unknown"]),
+        ("meaning_left", &["`gain_and_rest_on_guess` is unknown", "filter"]),
+        ("table_left", &["`screen` is unknown", "cells"]),
     ] {
         fails(&["weights", "verify", &bad(name)], 4, words);
         fails(&["render", "cornell", "-o", &out, "--weights", &bad(name)], 4, words);
     }
     assert!(is_empty(dir.path()));
-}
-
-/// Options of earlier versions are usage errors that say what they are called now.
-#[test]
-fn renamed_options_are_named() {
-    for (command, old, new) in [
-        (&["render", "cornell", "-o", "out.png", "--gi-frames", "3"][..], "--gi-frames", "--accumulate"),
-        (&["render", "cornell", "-o", "out.png", "--gi-frames=3"], "--gi-frames", "--accumulate"),
-        (&["fit", "cornell", "--gi-frames", "8"], "--gi-frames", "--accumulate"),
-        (&["render", "cornell", "-o", "out.png", "--unseen", "sky=1"], "--unseen", "--ambient-term"),
-        (&["chart", "--out", "out", "--most-samples", "64"], "--most-samples", "--max-samples"),
-    ] {
-        fails(command, 2, &[&format!("`{old}` was renamed to `{new}`")]);
-    }
-    // Negative control: an option that there never was.
-    let out = bouncelight(&["render", "cornell", "-o", "out.png", "--gi-rays", "3"]);
-    assert!(!String::from_utf8_lossy(&out.stderr).contains("renamed"));
 }
 
 #[test]

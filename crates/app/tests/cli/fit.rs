@@ -91,16 +91,3 @@ fn what_cannot_be_is_told() {
     }
     assert!(!folder.path().join("a.png").exists());
 }
-
-/// Learning on the device was removed; whoever asks for it hears where it went.
-#[test]
-fn learning_has_left_and_says_so() {
-    let folder = tempfile::tempdir().unwrap();
-    let run = |args: &[&str]| bouncelight(folder.path(), &[&["fit", "paper-room:7", "--size", "64x32"], args].concat());
-    for asked in [&["--learn", "5"][..], &["--learn=5"], &["--learn"]] {
-        ends(&run(asked), 2, &["--learn", "no longer", "bouncelight_training.filter.scene", "--weights"]);
-    }
-    let help = ends(&run(&["--help"]), 0, &["--weights"]);
-    assert!(!help.contains("--learn"), "{help}");
-    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0, "nothing is left behind");
-}

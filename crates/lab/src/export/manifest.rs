@@ -140,7 +140,6 @@ pub struct Binding {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Dispatch {
     /// The pass's label, as in timing tables.
-    #[serde(deserialize_with = "crate::labels::read")]
     pub label: String,
     /// Index into `shaders`.
     pub shader: usize,
@@ -171,9 +170,7 @@ pub struct Frame {
     pub writes: Vec<Write>,
     /// Indices into `dispatches`.
     pub dispatches: Vec<usize>,
-    /// Updates of the radiance cache in the frame, by which the host's `cache_iteration` grows;
-    /// `rounds` in schema 1.
-    #[serde(alias = "rounds")]
+    /// Updates of the radiance cache in the frame, by which the host's `cache_iteration` grows.
     pub cache_updates: u32,
 }
 

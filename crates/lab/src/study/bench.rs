@@ -37,7 +37,6 @@ pub struct Spread {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct PassTime {
     /// Label of the pass (`render.gbuffer`, `net.enc0.0`, …).
-    #[serde(deserialize_with = "crate::labels::read")]
     pub pass: String,
     /// GPU time, milliseconds.
     pub ms: Spread,
@@ -55,7 +54,6 @@ pub struct Measurement {
     /// From before recording until the device is idle, milliseconds.
     pub wall_ms: Spread,
     /// Resident GPU bytes by owner.
-    #[serde(deserialize_with = "crate::labels::read_rows")]
     pub bytes: Vec<(String, u64)>,
     /// What passes of a steady frame do, where somebody has counted it (`study::count`).
     #[serde(default)]

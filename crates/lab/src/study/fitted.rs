@@ -26,7 +26,7 @@ pub struct Fitted {
     pub gather: Option<String>,
     /// The ambient term that was fitted to the scene, for `ambient` and `ssgi`, as `render
     /// --ambient-term` takes them.
-    #[serde(default, alias = "unseen", skip_serializing_if = "Option::is_none")]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub ambient_term: Option<String>,
     /// Frames of a still camera after which the target was met, for methods that settle; 1 for
     /// others.

@@ -12,7 +12,6 @@ use bouncelight::scene::{LUMENS_PER_WATT, Light, LightKind, SUN_ANGLE};
 struct Extent {
     radius: Option<f32>,
     angle: Option<f32>,
-    #[serde(alias = "stands_in")]
     is_emissive_proxy: bool,
 }
 

@@ -127,7 +127,6 @@ pub struct Unit {
     /// GPU memory of everything, bytes.
     pub bytes: u64,
     /// Which method drew in its place, and why.
-    #[serde(alias = "instead")]
     pub fallback: Option<String>,
 }
 

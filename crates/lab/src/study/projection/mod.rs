@@ -16,7 +16,6 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Cost {
     /// The pass's label, as in the timing table.
-    #[serde(deserialize_with = "crate::labels::read")]
     pub pass: String,
     /// Operations of all threads, on floats, integers and comparisons; a multiply-add counts 2, a
     /// transcendental or division 4.

@@ -92,7 +92,6 @@ pub struct Found {
     pub reason: Option<String>,
     /// Another method drew in its place, and why.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    #[serde(alias = "instead")]
     pub fallback: Option<String>,
     /// Why it fails, where that is known.
     #[serde(default, skip_serializing_if = "Option::is_none")]
