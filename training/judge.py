@@ -9,6 +9,7 @@ camera, settled before, turned by 1 degree each; one without says nothing of fra
 (or another of its numbers) is drawn with `render --gather caustics=0`, for references made without Cycles' "Reflective Caustics"; `gather+taa@pan` under temporal
 anti-aliasing (over the pan, or the frames) in place of --samples. A method `neural:FILE` is the network of that weights file; its row is called `neural NAME` after the file. Generators
 (`generator`, `generator-gather`, `generator:FILE`) paint pictures, so they have no light.
+`paths@N` is our path tracer with N paths a pixel, `paths+oidn@N` with Open Image Denoise on top; they have no light here.
 
 A folder of references holds either roomIIII_view0.exr, as cycles/paper_rooms.py writes them, or one folder a scene with scene.glb,
 frame0000.exr and meta.json. Rooms are averaged into one row a method; other scenes get a row each. With --rooms only these are taken, and
@@ -174,6 +175,16 @@ def draw(program, scene, row, path, size, samples):
     kind, *options = kind.split("+")
     taa = ["--taa", str(PAN_FRAMES if state == "pan" else max(int(state or 32) - 1, 1))] if "taa" in options else None
     options = [o for o in options if o != "taa"]
+    if kind == "paths":
+        with tempfile.TemporaryDirectory() as folder:
+            traced = os.path.join(folder, "traced.exr")
+            subprocess.run([program, "trace", *scene, "--size", size, "--spp", state, "--aov", "all", "-o", traced, "-q"], check=True)
+            if "oidn" in options:
+                from peers import paths  # It takes this module's functions.
+                paths.denoised(traced, path)
+            else:
+                write(path, rgb(layers(traced), ""))
+        return
     command = [program, "render", *scene, "--size", size, "--method", kind, *(taa or ["--samples", str(samples)]), "--aov", "all"]
     command += ["--weights", weights] if weights else []
     command += ["--gather", ",".join(options)] if options else []
@@ -249,7 +260,7 @@ def main():
                 stamps.put(path, stamp)
             drawn[method] = layers(path)
             if method in a.methods:
-                compare(group, name, row, path, reference, float("nan") if kind.startswith("generator") else light_error(drawn[method], drawn["direct"], truth, "+taa" in kind))
+                compare(group, name, row, path, reference, float("nan") if kind.startswith(("generator", "paths")) else light_error(drawn[method], drawn["direct"], truth, "+taa" in kind))
         extra = [("constant", with_constant(drawn["direct"], a.constant))] if a.constant else []
         extra += [("best constant", with_constant(drawn["direct"], best_constant(drawn["direct"], truth)))]
         for row, picture in extra:

@@ -13,10 +13,10 @@ use super::{
 };
 use crate::reference::{Kernel, ReferenceScene, TracerOptions};
 use bouncelight::gi::Method;
-use bouncelight::gpu::Gpu;
+use bouncelight::gpu::{Gpu, timing::Recorder};
 use bouncelight::gpu_scene::SceneGpu;
 use bouncelight::render::{
-    Blending, Renderer, RendererOptions,
+    Blending, Purpose, Renderer, RendererOptions, View,
     capture::{CaptureOptions, Layer, capture_with},
 };
 use bouncelight::scene::{Camera, Scene};
@@ -322,11 +322,17 @@ impl<'a> Session<'a> {
         })
     }
 
-    /// A frame whose layers nobody reads, but waited for: drivers let thousands of them pile up
-    /// otherwise.
+    /// A frame for its history alone, but waited for: drivers let thousands of them pile up otherwise.
     fn draw(&self, renderer: &mut Renderer, camera: &Camera) -> Result<(), SessionError> {
-        let options = CaptureOptions { samples: 1, seed: self.options.seed, ..Default::default() };
-        capture_with(self.gpu, renderer, &self.uploaded, camera, options, &mut || true)?;
+        let gpu = self.gpu;
+        let seed = self.options.seed.wrapping_mul(0x9e37_79b9);
+        let view = View::new(camera, self.size, [0.0; 2]).with_seed(seed);
+        let mut encoder = gpu.device.create_command_encoder(&Default::default());
+        let purpose = Purpose::WarmUp { first: true };
+        renderer.record_frame(&mut Recorder::new(&mut encoder), &gpu.queue, &self.uploaded, &view, purpose)?;
+        gpu.queue.submit([encoder.finish()]);
+        // A device that is lost says so to the next that reads.
+        let _ = gpu.device.poll(wgpu::PollType::wait_indefinitely());
         Ok(())
     }
 }
