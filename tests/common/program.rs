@@ -27,3 +27,8 @@ pub fn fails(args: &[&str], code: i32, words: &[&str]) {
 pub fn path(dir: &tempfile::TempDir, name: &str) -> String {
     dir.path().join(name).to_str().expect("a temporary path is text").into()
 }
+
+/// Whether nothing lies in a folder.
+pub fn is_empty(dir: &std::path::Path) -> bool {
+    std::fs::read_dir(dir).expect("the folder exists").next().is_none()
+}

@@ -1,5 +1,6 @@
 //! The rasteriser: G-buffers, lights, textures, what blends and what moves, whole frames and the tone curve.
 
+mod blocks;
 #[path = "../common/build.rs"]
 mod build;
 mod closed;

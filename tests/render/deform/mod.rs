@@ -2,5 +2,6 @@
 
 mod files;
 mod light;
+mod morphs;
 mod motion;
 mod rays;

@@ -24,3 +24,4 @@ mod stability;
 mod trace;
 mod training;
 mod tuned;
+mod weights;
