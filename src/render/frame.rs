@@ -7,7 +7,7 @@ use super::composite::Backdrop;
 use super::cull::DrawnCount;
 use super::direct::DirectInputs;
 use super::gbuffer::GbufferInputs;
-use super::generator::Generator;
+use super::generator::{Generator, Seen};
 use super::gi_inputs::{clear, gi_inputs};
 use super::light_choice::LightOptions;
 use super::lights::LightLists;
@@ -118,13 +118,12 @@ impl Renderer {
         let mut taa = options.taa.then(|| TaaPass::new(device));
         let picture = passes.bind(device, &frame, &targets, &mut taa);
         let indirect = method::build(device, queue, size, &options.method)?;
-        let mut generator = match &options.method {
-            gi::Method::Generator(neural) => Some(Generator::new(device, queue, neural, size)?),
+        let hdr = taa.as_ref().map_or(&targets.hdr, TaaPass::current);
+        let seen = Seen { frame: &frame, targets: &targets, hdr };
+        let generator = match &options.method {
+            gi::Method::Generator(neural) => Some(Generator::new(device, queue, neural, seen)?),
             _ => None,
         };
-        if let Some(generator) = &mut generator {
-            generator.bind(&frame, &targets, taa.as_ref().map_or(&targets.hdr, TaaPass::current))?;
-        }
         let method = options.method.name();
         let device = device.clone();
         let (lighting, previous_transforms, drawn) = (None, PreviousTransforms::default(), DrawnCount::default());
@@ -159,7 +158,7 @@ impl Renderer {
             }
             if let Some(generator) = &mut self.generator {
                 let hdr = self.taa.as_ref().map_or(&self.targets.hdr, TaaPass::current);
-                generator.bind(&self.frame, &self.targets, hdr)?;
+                generator.resize(Seen { frame: &self.frame, targets: &self.targets, hdr })?;
             }
         }
         Ok(())

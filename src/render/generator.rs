@@ -20,6 +20,15 @@ use std::fmt::Write;
 /// Features that a frame has, as `pictures.wgsl` numbers them.
 const FEATURES: [&str; 5] = ["depth", "direct", "diffuse", "normal", "gathered"];
 
+/// What it reads and paints over.
+#[derive(Clone, Copy)]
+pub(super) struct Seen<'a> {
+    pub frame: &'a wgpu::Buffer,
+    pub targets: &'a Targets,
+    /// The picture.
+    pub hdr: &'a Target,
+}
+
 /// The network and its passes.
 pub(super) struct Generator {
     device: wgpu::Device,
@@ -32,8 +41,8 @@ pub(super) struct Generator {
     depth_range: wgpu::ComputePipeline,
     pictures: wgpu::ComputePipeline,
     paint: wgpu::ComputePipeline,
-    /// Of the pictures and of painting; `None` until [`Generator::bind`].
-    groups: Option<[wgpu::BindGroup; 2]>,
+    /// Of the pictures and of painting.
+    groups: [wgpu::BindGroup; 2],
     /// Of the next frame's dropout, where it is on.
     seed: Option<u32>,
 }
@@ -44,54 +53,46 @@ impl Generator {
     /// # Errors
     /// [`GiError::Feature`] or [`GiError::Output`] when the weights speak of something else,
     /// [`GiError::Network`] when the size does not fit the device.
-    pub fn new(device: &wgpu::Device, queue: &wgpu::Queue, neural: &Neural, size: [u32; 2]) -> Result<Self, GiError> {
+    pub fn new(device: &wgpu::Device, queue: &wgpu::Queue, neural: &Neural, seen: Seen<'_>) -> Result<Self, GiError> {
         use pipelines::*;
         let prelude = prelude(&neural.weights, neural.network.input_precision())?;
         let layout = |name, types: &[_]| layout(device, name, wgpu::ShaderStages::COMPUTE, types);
         let read = [UNIFORM, LOAD, LOAD, LOAD, LOAD, LOAD, LOAD, LOAD, LOAD, READ_WRITE, READ_WRITE];
         let layouts = [layout("render.pictures", &read), layout("render.paint", &[UNIFORM, LOAD, READ, STORE_HALF])];
+        let network = network(device, queue, neural, seen.targets.size)?;
+        let range = device.create_buffer(&wgpu::BufferDescriptor {
+            label: Some("render.pictures.range"),
+            size: 8,
+            usage: wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST,
+            mapped_at_creation: false,
+        });
+        let groups = groups(device, &layouts, (&range, &network), seen);
         let module = shaders::module_with(device, "render.pictures", &prelude);
         let pipeline = |entry| bind::pipeline(device, "render.pictures", &module, entry, &[&layouts[0]]);
         Ok(Self {
             depth_range: pipeline("depth_range"),
             pictures: pipeline("pictures"),
             paint: compute(device, "render.paint", "paint", &[&layouts[1]]),
-            network: network(device, queue, neural, size)?,
-            range: device.create_buffer(&wgpu::BufferDescriptor {
-                label: Some("render.pictures.range"),
-                size: 8,
-                usage: wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST,
-                mapped_at_creation: false,
-            }),
+            network,
+            range,
             device: device.clone(),
             queue: queue.clone(),
             seed: neural.network.dropout,
             neural: neural.clone(),
-            size,
+            size: seen.targets.size,
             layouts,
-            groups: None,
+            groups,
         })
     }
 
-    /// Binds the targets and the picture that is painted over; called again on resize.
+    /// Other targets, of another size.
     ///
     /// # Errors
     /// [`GiError::Network`] when the size does not fit the device.
-    pub fn bind(&mut self, frame: &wgpu::Buffer, targets: &Targets, hdr: &Target) -> Result<(), GiError> {
-        if targets.size != self.size {
-            self.network = network(&self.device, &self.queue, &self.neural, targets.size)?;
-            self.size = targets.size;
-        }
-        let t = targets;
-        let read =
-            [&t.depth, &t.normal, &t.albedo, &t.specular, &t.emissive, &t.direct_diffuse, &t.direct_specular, hdr];
-        let buffers = [self.range.as_entire_binding(), self.network.input().resource()];
-        let all = [frame.as_entire_binding()].into_iter().chain(read.map(pipelines::view)).chain(buffers);
-        let pictures = pipelines::group(&self.device, "render.pictures", &self.layouts[0], &all.collect::<Vec<_>>());
-        let answer = self.network.output().resource();
-        let painted = [frame.as_entire_binding(), pipelines::view(&t.depth), answer, pipelines::view(hdr)];
-        let paint = pipelines::group(&self.device, "render.paint", &self.layouts[1], &painted);
-        self.groups = Some([pictures, paint]);
+    pub fn resize(&mut self, seen: Seen<'_>) -> Result<(), GiError> {
+        self.network = network(&self.device, &self.queue, &self.neural, seen.targets.size)?;
+        self.size = seen.targets.size;
+        self.groups = groups(&self.device, &self.layouts, (&self.range, &self.network), seen);
         Ok(())
     }
 
@@ -101,21 +102,19 @@ impl Generator {
             self.network.set_seed(&self.queue, *seed);
             *seed = seed.wrapping_add(1);
         }
-        let Some([_, paint]) = &self.groups else { return };
         self.record_input(recorder);
         self.network.record(recorder);
         recorder.compute("paint", |pass| {
             pass.set_pipeline(&self.paint);
-            pass.set_bind_group(0, paint, &[]);
+            pass.set_bind_group(0, &self.groups[1], &[]);
             pipelines::dispatch(pass, self.size);
         });
     }
 
     fn record_input(&self, recorder: &mut Recorder<'_>) {
-        let Some([pictures, _]) = &self.groups else { return };
         recorder.encoder().clear_buffer(&self.range, 0, None);
         recorder.compute("pictures", |pass| {
-            pass.set_bind_group(0, pictures, &[]);
+            pass.set_bind_group(0, &self.groups[0], &[]);
             for pipeline in [&self.depth_range, &self.pictures] {
                 pass.set_pipeline(pipeline);
                 pipelines::dispatch(pass, self.size);
@@ -170,6 +169,22 @@ fn network(device: &wgpu::Device, queue: &wgpu::Queue, neural: &Neural, size: [u
     let setup = Setup { options: neural.network, tuned: neural.tuned.clone() };
     Network::new(device, queue, &neural.weights, size, setup)
         .map_err(|e| GiError::Network { cells: size, source: Box::new(e) })
+}
+
+/// Of the pictures, whose depth range and table lie in the buffers, and of painting.
+fn groups(
+    device: &wgpu::Device,
+    layouts: &[wgpu::BindGroupLayout; 2],
+    (range, network): (&wgpu::Buffer, &Network),
+    Seen { frame, targets: t, hdr }: Seen<'_>,
+) -> [wgpu::BindGroup; 2] {
+    let read = [&t.depth, &t.normal, &t.albedo, &t.specular, &t.emissive, &t.direct_diffuse, &t.direct_specular, hdr];
+    let buffers = [range.as_entire_binding(), network.input().resource()];
+    let all = [frame.as_entire_binding()].into_iter().chain(read.map(pipelines::view)).chain(buffers);
+    let pictures = pipelines::group(device, "render.pictures", &layouts[0], &all.collect::<Vec<_>>());
+    let answer = network.output().resource();
+    let painted = [frame.as_entire_binding(), pipelines::view(&t.depth), answer, pipelines::view(hdr)];
+    [pictures, pipelines::group(device, "render.paint", &layouts[1], &painted)]
 }
 
 /// Constants of `pictures.wgsl` for what the weights want.
