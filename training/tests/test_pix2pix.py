@@ -217,7 +217,9 @@ class Toy(unittest.TestCase):
         with self.assertRaisesRegex(TrainingError, "another steps"):
             self.run_in("stopped", self.config(steps=30))
         shutil.copytree(os.path.join(self.folder, "whole-published"), os.path.join(self.folder, "further"))
-        self.assertEqual(self.run_in("further", self.config(steps=30)).step, 30)
+        further = self.run_in("further", self.config(steps=30))
+        self.assertEqual((further.step, len(further.before)), (30, 1))
+        self.assertIn("--steps 25", further.before[0])
         run, out = os.path.join(self.folder, "whole-published"), os.path.join(self.folder, "toy.safetensors")
         sizes = []
         for stored, delta in (("f32", 1e-6), ("f16", 1e-2), ("i8", 1e-2)):

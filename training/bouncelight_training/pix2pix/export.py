@@ -45,7 +45,7 @@ def provenance(state, scores):
               "gathered": "the generator of Harris-Dewey and Klein 2021, given the picture with the light of `gather` as well, which also goes around it",
               "deep-illumination": "Thomas and Forbes 2018, generator of their published code"}
     report = {key: value for key, value in state["report"].items() if key != "names"} | {"first_and_last": [state["report"]["names"][0], state["report"]["names"][-1]]}
-    return {"recipe": recipe[config["network"]], "adversarial": adversarial[config["adversarial"]], "command": state["command"], "commit": state["commit"],
+    return {"recipe": recipe[config["network"]], "adversarial": adversarial[config["adversarial"]], "command": state["command"], "goes_on_from": state["before"], "commit": state["commit"],
             "date": datetime.date.today().isoformat(), "device": state["machine"], "seed": config["seed"], "config": config, "samples_seen": state["step"],
             "training_minutes": round(state["elapsed"] / 60, 1), "data": {"inputs": "bouncelight's rasteriser, Filmic, normals clamped", "report": report},
             "validation": {"measure": "L1 of pictures in [-1, 1]; PSNR of 8-bit pictures, dB; without dropout", "l1": round(scores["validation_l1"], 5),

@@ -116,6 +116,8 @@ class Run:
             trained.append(self.discriminator)
         self.optimisers = [torch.optim.Adam(m.parameters(), lr=config.learning_rate, betas=(config.beta1, config.beta2)) for m in trained]
         self.step, self.elapsed, self.rows, self.sums = 0, 0.0, [], [0.0] * 4
+        # Commands of which this one was gone on with at their ends.
+        self.before = []
 
     @property
     def checkpoint_path(self):
@@ -125,7 +127,7 @@ class Run:
         """Writes checkpoint.pt whole: a kill leaves the old one or the new one."""
         state = {"config": dataclasses.asdict(self.config), **{name: dict(network.state_dict()) for name, network in self.networks.items()},
                  "optimisers": [o.state_dict() for o in self.optimisers], "step": self.step, "elapsed": self.elapsed, "rows": self.rows, "sums": self.sums,
-                 "command": command_of(self.config, self.folder), "commit": self.commit, "machine": machine_of(self.device), "report": self.examples.report}
+                 "command": command_of(self.config, self.folder), "before": self.before, "commit": self.commit, "machine": machine_of(self.device), "report": self.examples.report}
         torch.save(state, self.checkpoint_path + ".part")
         os.replace(self.checkpoint_path + ".part", self.checkpoint_path)
 
@@ -146,6 +148,8 @@ class Run:
         for optimiser, values in zip(self.optimisers, state["optimisers"]):
             optimiser.load_state_dict(values)
         self.step, self.elapsed, self.rows, self.sums = state["step"], state["elapsed"], state["rows"], state["sums"]
+        further = any(ours[k] != state["config"].get(k) for k in AT_THE_END)
+        self.before = state["before"] + [state["command"]] if further else state["before"]
         print(f"continues at step {self.step} ({self.elapsed / 60:.1f} min used)", file=sys.stderr)
 
     @property
