@@ -47,6 +47,11 @@ pub fn why(test: &str, subject: &str) -> Option<&'static str> {
             "it paints the picture from the picture: what is outside it, and how large things are in it, change the \
              answer"
         }
+        ("metal" | "mirror", "generator") => {
+            "its pictures say neither how rough a surface is nor what is behind the camera: it paints metal as plaster"
+        }
+        ("unseen", "generator") => "it has learnt rooms of the paper's kind, and paints their light and colours",
+        ("frozen", "generator") => "dropout is on: each frame draws another half of the channels",
         ("flat", "generator") => {
             "a network of seven halvings paints what it has learnt from clutter onto an even floor"
         }

@@ -126,7 +126,7 @@ fn tail(w: &mut String, record: &Record) -> std::fmt::Result {
          7680x4320` does where memory allows.\n\
          - 8-bit networks: there are none. Another driver: one adapter draws all; `--adapter` and `--backend` choose \
          it, and `tests/net` compares networks with the CPU reference.\n\
-         - InstanceNorm: the published generator's weights are not here.\n\
+         - InstanceNorm: generators that come with the program have GroupNorm (docs/results/limits.md compares).\n\
          - Temporal anti-aliasing: `tests/gi/taa.rs`."
     )?;
     let names = |of: Vec<&str>| of.join(", ");
