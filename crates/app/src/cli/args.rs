@@ -195,12 +195,11 @@ pub fn real_time(name: MethodName, global: &Global, weights: Option<&PathBuf>) -
 fn weights_of(method: MethodName, path: Option<&PathBuf>) -> Result<Weights> {
     let Some(path) = path else { return Ok(shipped::of(method)?) };
     let weights = shipped::find(path)?;
-    if shipped::fits(method, &weights) {
+    let own = shipped::method_of(&weights);
+    if own == method {
         return Ok(weights);
     }
-    let (wants, name) = (if method.paints() { "a generator's, on pictures" } else { "a filter's" }, method.name());
-    let table = &weights.table.name;
-    Err(usage(format!("{}: weights of table `{table}`; method `{name}` wants {wants}", path.display())))
+    Err(usage(format!("{}: weights of method `{}`, not of `{}`", path.display(), own.name(), method.name())))
 }
 
 /// The weights in `path`, or the shipped ones of that name; without a path the shipped filter.

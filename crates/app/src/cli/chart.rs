@@ -203,8 +203,7 @@ fn entries(global: &Global, args: &Args) -> Result<Vec<Entry>> {
         entries.push(Entry::Method { name, method: Method::Gather(*options) });
     }
     for path in &args.weights {
-        let paints = shipped::fits(MethodName::Generator, &shipped::find(path)?);
-        let method = if paints { MethodName::Generator } else { MethodName::Neural };
+        let method = shipped::method_of(&shipped::find(path)?);
         let stem = path.file_stem().map_or_else(String::new, |s| s.to_string_lossy().into_owned());
         let name = format!("{} {stem}", method.name());
         entries.push(Entry::Method { name, method: real_time(method, global, Some(path))? });

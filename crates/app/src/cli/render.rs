@@ -40,10 +40,10 @@ pub struct Args {
     backdrop: Backdrop,
     #[command(flatten)]
     sequence: sequence::SequenceFlags,
-    /// Method for indirect light [default: as `fit` found, else gather; neural with --weights].
+    /// Method for indirect light [default: as `fit` found, else gather; with --weights theirs].
     #[arg(long, value_parser = MethodParser(draws_frames), help_heading = METHOD)]
     method: Option<MethodName>,
-    /// Weights of `neural` [default: the shipped `filter`].
+    /// Weights of neural, generator or generator-gather: a file, or the name of shipped ones [default: those shipped].
     #[arg(long, help_heading = METHOD, value_name = "FILE")]
     weights: Option<PathBuf>,
     #[command(flatten)]
@@ -92,9 +92,9 @@ impl Args {
     /// The method asked for, or that of the weights, or the best that needs nothing but the scene.
     fn method(&self) -> MethodName {
         let of_weights = |path: &PathBuf| match shipped::find(path) {
-            Ok(weights) if shipped::fits(MethodName::Generator, &weights) => MethodName::Generator,
+            Ok(weights) => shipped::method_of(&weights),
             // What is wrong with the file is said where it is read.
-            _ => MethodName::Neural,
+            Err(_) => MethodName::Neural,
         };
         self.method.unwrap_or_else(|| self.weights.as_ref().map_or(MethodName::Gather, of_weights))
     }

@@ -50,7 +50,7 @@ pub fn words(state: &State, output: &str) -> Vec<String> {
         flag("accumulate", "1".into());
     }
     // Weights of another kind of network are not what draws (`shipped::fitting`).
-    let others = |path: &Path| shipped::find(path).is_ok_and(|weights| !shipped::fits(s.left, &weights));
+    let others = |path: &Path| shipped::find(path).is_ok_and(|weights| shipped::method_of(&weights) != s.left);
     if let (true, Some(weights)) = (s.left.needs_weights(), s.weights.as_ref().filter(|path| !others(path))) {
         flag("weights", weights.display().to_string());
     }

@@ -32,9 +32,14 @@ pub fn find(path: &Path) -> Result<Weights, WeightsError> {
     }
 }
 
-/// Whether weights are of the kind that `method` runs: a generator's, or a filter's.
-pub fn fits(method: MethodName, weights: &Weights) -> bool {
-    method.paints() == (weights.table.name == "images")
+/// The method that runs such weights: a filter's, a generator's, or one's that is given the picture with the light of
+/// `gather`.
+pub fn method_of(weights: &Weights) -> MethodName {
+    match weights.table.name == "images" {
+        true if weights.inputs.iter().any(|feature| feature.name == "gathered") => MethodName::GeneratorGather,
+        true => MethodName::Generator,
+        false => MethodName::Neural,
+    }
 }
 
 /// What `method` runs: the weights in `path` if they are of its kind, else those that come with the program. For many
@@ -43,7 +48,7 @@ pub fn fits(method: MethodName, weights: &Weights) -> bool {
 /// # Errors
 /// As [`Weights::load`].
 pub fn fitting(method: MethodName, path: Option<&Path>) -> Result<Weights, WeightsError> {
-    match path.map(find).transpose()?.filter(|weights| fits(method, weights)) {
+    match path.map(find).transpose()?.filter(|weights| method_of(weights) == method) {
         Some(weights) => Ok(weights),
         None => of(method),
     }

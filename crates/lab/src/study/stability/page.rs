@@ -124,7 +124,7 @@ fn tail(w: &mut String, record: &Record) -> std::fmt::Result {
         "## What is not tested here\n\n\
          - 8K as a whole picture: `sizes` draws pictures as wide and as high as 8K, not both. `bench --size \
          7680x4320` does where memory allows.\n\
-         - 8-bit networks: there are none. Another driver: one adapter draws all; `--adapter` and `--backend` choose \
+         - Arithmetic in 8 bits: networks may be stored so, and run in 16 or 32. Another driver: one adapter draws all; `--adapter` and `--backend` choose \
          it, and `tests/net` compares networks with the CPU reference.\n\
          - InstanceNorm: generators that come with the program have GroupNorm (docs/results/limits.md compares).\n\
          - Temporal anti-aliasing: `tests/gi/taa.rs`."
