@@ -199,7 +199,14 @@ fn weights_of(method: MethodName, path: Option<&PathBuf>) -> Result<Weights> {
     if own == method {
         return Ok(weights);
     }
-    Err(usage(format!("{}: weights of method `{}`, not of `{}`", path.display(), own.name(), method.name())))
+    let given = if own == MethodName::GeneratorGather { " with `gathered`" } else { "" };
+    let wants = match method {
+        MethodName::Generator => "`images` without `gathered`, a generator's",
+        MethodName::GeneratorGather => "`images` with `gathered`, a generator's",
+        _ => "`cells`, a filter's",
+    };
+    let (path, table, name) = (path.display(), &weights.table.name, method.name());
+    Err(usage(format!("{path}: weights of table `{table}`{given}; method `{name}` wants {wants}")))
 }
 
 /// The weights in `path`, or the shipped ones of that name; without a path the shipped filter.
