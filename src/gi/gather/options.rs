@@ -182,7 +182,6 @@ mod tests {
         ] {
             assert_eq!(options.words().unwrap().parse(), Ok(options));
         }
-        assert_eq!("even=1,first_rounds=8".parse::<Options>(), "progressive=1,first_updates=8".parse());
         assert_eq!(Options::default().words(), None);
         assert_eq!("rays=all".parse(), Ok(Options::default()));
         for bad in [

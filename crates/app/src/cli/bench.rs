@@ -32,7 +32,7 @@ pub struct Args {
     method: Option<Methods>,
     #[command(flatten)]
     fitted: super::fitted::Flag,
-    /// Weights of neural, generator or generator-gather: a file, or the name of shipped ones [default: those shipped].
+    /// Weights of a network: a file, or a shipped one's name [default: the method's shipped].
     #[arg(long, value_name = "FILE", help_heading = "Method")]
     weights: Option<PathBuf>,
     /// Frames measured, 1 or more.

@@ -43,7 +43,7 @@ pub struct Args {
     /// Method for indirect light [default: as `fit` found, else gather; with --weights theirs].
     #[arg(long, value_parser = MethodParser(draws_frames), help_heading = METHOD)]
     method: Option<MethodName>,
-    /// Weights of neural, generator or generator-gather: a file, or the name of shipped ones [default: those shipped].
+    /// Weights, or the name of shipped ones [default: the method's].
     #[arg(long, help_heading = METHOD, value_name = "FILE")]
     weights: Option<PathBuf>,
     #[command(flatten)]

@@ -15,7 +15,7 @@ pub struct Args {
     /// Method for indirect light to begin with [default: as `fit` found, else as saved].
     #[arg(long, value_parser = MethodParser(|_| true))]
     method: Option<MethodName>,
-    /// Weights of neural, generator or generator-gather: a file, or the name of shipped ones [default: those shipped].
+    /// Weights of a network: a file, or a shipped one's name [default: the method's shipped].
     #[arg(long, value_name = "FILE")]
     weights: Option<PathBuf>,
     /// Window size, points [default: as saved].

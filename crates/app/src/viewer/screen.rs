@@ -59,7 +59,7 @@ impl Screen {
             alpha_mode: wgpu::CompositeAlphaMode::Auto,
             view_formats: Vec::new(),
         };
-        surface.configure(&gpu.device, &config);
+        configure(&surface, &gpu.device, &config);
         let side = gpu.device.limits().max_texture_dimension_2d as usize;
         let scale = Some(window.scale_factor() as f32);
         let input =
@@ -105,7 +105,7 @@ impl Screen {
         let (width, height) = (size.width.min(most), size.height.min(most));
         if [width, height] != self.size() {
             (self.config.width, self.config.height) = (width, height);
-            self.surface.configure(device, &self.config);
+            configure(&self.surface, device, &self.config);
         }
         true
     }
@@ -115,7 +115,7 @@ impl Screen {
         match self.instance.create_surface(self.window.clone()) {
             Ok(surface) => {
                 self.surface = surface;
-                self.surface.configure(device, &self.config);
+                configure(&self.surface, device, &self.config);
             }
             Err(e) => tracing::warn!("the window's surface cannot be recreated: {e}"),
         }
@@ -141,7 +141,7 @@ impl Screen {
             C::Success(texture) | C::Suboptimal(texture) => Acquired::Texture(texture),
             C::Timeout | C::Occluded => Acquired::Hidden,
             C::Outdated | C::Validation => {
-                self.surface.configure(device, &self.config);
+                configure(&self.surface, device, &self.config);
                 Acquired::Again
             }
             C::Lost => {
@@ -150,4 +150,22 @@ impl Screen {
             }
         }
     }
+}
+
+/// Times that [`configure`] tries.
+const TRIES: usize = 200;
+
+/// Configures the surface. wgpu refuses that while another thread's work is under way, as where paths are traced on a
+/// CPU driver: then it waits and tries again.
+fn configure(surface: &wgpu::Surface<'_>, device: &wgpu::Device, config: &wgpu::SurfaceConfiguration) {
+    for _ in 0..TRIES {
+        let scope = device.push_error_scope(wgpu::ErrorFilter::Validation);
+        surface.configure(device, config);
+        if pollster::block_on(scope.pop()).is_none() {
+            return;
+        }
+        let _ = device.poll(wgpu::PollType::wait_indefinitely());
+    }
+    // Once more, for the window to say what is wrong.
+    surface.configure(device, config);
 }

@@ -34,7 +34,7 @@ fn the_reference_is_seen_at_once_and_leaves_nothing_behind() {
         // Denoised is what is seen, not what is measured.
         { "resize": [800, 500] }, { "key": "P" }, { "wait": 10 }, { "click": "denoise" }, { "wait": 4 }, { "key": "P" },
         { "resize": [340, 170] }, { "wait": 60 }, { "wait": "idle" },
-        { "expect": { "/reference/denoised": true, at: 4 } }, { "screenshot": "denoised.png" },
+        { "expect": { "/reference/denoised": true, at: 4, "/errors": 0 } }, { "screenshot": "denoised.png" },
         { "expect_saved": { "psnr": "/verdict/psnr" } },
         // Whoever leaves the split hears nothing of it any more, nor its old numbers when coming back.
         { "key": "P" }, { "until": { "/status": { "contains": "Reference: " } } }, { "key": "P" },
