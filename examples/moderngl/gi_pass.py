@@ -99,8 +99,7 @@ class Pass:
         for number in frame["dispatches"]:
             self._dispatch(m["dispatches"][number], inputs)
         self.k += 1
-        # `rounds` and `round` are the names in schema 1.
-        self.cache_iteration += frame.get("cache_updates", frame.get("rounds"))
+        self.cache_iteration += frame["cache_updates"]
 
     def _value(self, value, camera):
         if not isinstance(value, str):
@@ -108,7 +107,7 @@ class Pass:
         name, _, more = value.partition(" + ")
         if name.startswith("camera."):
             return camera[name.removeprefix("camera.")]
-        return {"frame": self.k, "cache_iteration": self.cache_iteration, "round": self.cache_iteration}[name] + int(more or 0)
+        return {"frame": self.k, "cache_iteration": self.cache_iteration}[name] + int(more or 0)
 
     def _write(self, write, camera):
         layout = self.manifest["uniforms"][write["type"]]

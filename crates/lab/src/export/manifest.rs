@@ -192,7 +192,7 @@ pub struct Write {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(untagged)]
 pub enum Value {
-    /// A number of the host's: `frame`, `cache_iteration`, `cache_iteration + 1` … (`round` in schema 1), or `camera.` and a name of
+    /// A number of the host's: `frame`, `cache_iteration`, `cache_iteration + 1` …, or `camera.` and a name of
     /// `docs/guide/embedding.md`.
     Host(String),
     /// A constant.
@@ -209,17 +209,4 @@ pub struct Steady {
     pub from: usize,
     /// After how many frames.
     pub period: usize,
-}
-
-#[cfg(test)]
-mod tests {
-    use super::Frame;
-
-    #[test]
-    fn frames_of_schema_1_are_read() {
-        let frame =
-            |key: &str| serde_json::from_str::<Frame>(&format!(r#"{{ "writes": [], "dispatches": [], "{key}": 4 }}"#));
-        assert_eq!(frame("rounds").unwrap(), frame("cache_updates").unwrap());
-        assert!(frame("laps").is_err(), "negative control");
-    }
 }
