@@ -115,15 +115,14 @@ export class Pass {
     }
     pass.end();
     this.k += 1;
-    // `rounds` and `round` are the names in schema 1.
-    this.cacheIteration += frame.cache_updates ?? frame.rounds;
+    this.cacheIteration += frame.cache_updates;
   }
 
   #value(value, camera) {
     if (typeof value !== "string") return value;
     const [name, more] = value.split(" + ");
     if (name.startsWith("camera.")) return camera[name.slice(7)];
-    const counters = { frame: this.k, cache_iteration: this.cacheIteration, round: this.cacheIteration };
+    const counters = { frame: this.k, cache_iteration: this.cacheIteration };
     return counters[name] + Number(more ?? 0);
   }
 
