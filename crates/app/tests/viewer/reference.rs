@@ -24,10 +24,12 @@ fn the_reference_is_seen_at_once_and_leaves_nothing_behind() {
     let script = json!([
         { "wait": "loaded" }, { "key": "P" }, { "wait": "idle" }, { "screenshot": "raster.png" },
         // Dimmed until something has been traced; then a sixteenth of the pixels, then all of them.
-        { "key": "X" }, { "wait": 3 }, { "expect": { at: 0, "/reference/texel": null } }, { "screenshot": "dimmed.png" },
+        { "key": "X" }, { "wait": 3 }, { "expect": { at: 0, "/reference/texel": null } },
+        { "screenshot": "dimmed.png" },
         { "until": { "/reference/texel": { "min": 1 } } },
         { "expect": { at: 0, "/reference/texel": 4, "/verdict": null } }, { "screenshot": "coarse.png" },
-        { "wait": "samples:1" }, { "expect": { "/reference/texel": 1 } }, { "wait": "idle" }, { "screenshot": "traced.png" },
+        { "wait": "samples:1" }, { "expect": { "/reference/texel": 1 } }, { "wait": "idle" },
+        { "screenshot": "traced.png" },
         { "expect": { at: 4, "/reference/finished": true, "/verdict/by": ["direct", "reference"] } },
         // Four samples of a box are noise for the greater part, and its numbers are grey.
         { "expect": { "/verdict/noisy": true } }, { "save": { "psnr": "/verdict/psnr" } },
