@@ -4,6 +4,9 @@
 use super::readback::{self, ReadbackError};
 use super::{Gpu, shaders};
 
+/// What the probe draws into. OpenGL draws into halves where it cannot into 32 bits.
+const TARGET: wgpu::TextureFormat = wgpu::TextureFormat::Rgba16Float;
+
 /// A fault of a driver.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum DriverFault {
@@ -81,7 +84,7 @@ fn still_coordinates_are_finite(gpu: &Gpu) -> Result<bool, ReadbackError> {
     let layout = wgpu::TexelCopyBufferLayout { offset: 0, bytes_per_row: Some(16), rows_per_image: None };
     gpu.queue.write_texture(white.as_image_copy(), &[255; 64], layout, size(4));
     let usage = wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::COPY_SRC;
-    let target = texture("probe.still", 2, wgpu::TextureFormat::Rgba32Float, usage);
+    let target = texture("probe.still", 2, TARGET, usage);
     let linear = wgpu::FilterMode::Linear;
     let sampler = device.create_sampler(&wgpu::SamplerDescriptor {
         label: Some("probe.still"),
@@ -108,7 +111,7 @@ fn still_coordinates_are_finite(gpu: &Gpu) -> Result<bool, ReadbackError> {
             module: &module,
             entry_point: Some("still"),
             compilation_options: Default::default(),
-            targets: &[Some(wgpu::TextureFormat::Rgba32Float.into())],
+            targets: &[Some(TARGET.into())],
         }),
         multiview_mask: None,
         cache: None,
@@ -142,7 +145,7 @@ fn still_coordinates_are_finite(gpu: &Gpu) -> Result<bool, ReadbackError> {
     drop(pass);
     gpu.queue.submit([encoder.finish()]);
     let bytes = readback::texture(device, &gpu.queue, &target)?;
-    let values: Vec<f32> = bytemuck::pod_collect_to_vec(&bytes);
+    let values: Vec<half::f16> = bytemuck::pod_collect_to_vec(&bytes);
     Ok(values.iter().all(|v| v.is_finite()))
 }
 

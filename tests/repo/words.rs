@@ -87,8 +87,8 @@ fn files(folder: &Path, found: &mut Vec<PathBuf>) {
     for entry in std::fs::read_dir(folder).expect("a folder").flatten() {
         let path = entry.path();
         let ending = path.extension().and_then(|e| e.to_str()).unwrap_or_default();
-        if path.is_dir() && !path.ends_with("docs/log") && !path.ends_with("docs/measured") && !path.ends_with("target")
-        {
+        let left_out = ["docs/log", "docs/measured", "target", "node_modules"].iter().any(|end| path.ends_with(end));
+        if path.is_dir() && !left_out {
             files(&path, found);
         } else if ["rs", "wgsl", "py", "js", "md"].contains(&ending) {
             found.push(path);

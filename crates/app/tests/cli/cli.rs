@@ -130,6 +130,20 @@ fn no_adapter_exits_with_3_and_says_what_to_install() {
 }
 
 #[test]
+fn doctor_describes_each_backend_or_says_that_it_has_no_adapter() {
+    // OpenGL on the CPU cannot draw into everything that Vulkan can.
+    let codes = ["vulkan", "gl"].map(|backend| {
+        let out = bouncelight(&["doctor", "--backend", backend, "--json"]);
+        match out.status.code() {
+            Some(0) => assert!(String::from_utf8_lossy(&out.stdout).contains("driver_faults")),
+            code => assert_eq!(code, Some(3), "{backend}: {}", String::from_utf8_lossy(&out.stderr)),
+        }
+        out.status.code()
+    });
+    assert!(common::gpu().is_none() || codes.contains(&Some(0)));
+}
+
+#[test]
 fn a_wrong_backend_variable_is_named() {
     let out =
         Command::new(env!("CARGO_BIN_EXE_bouncelight")).arg("doctor").env("WGPU_BACKEND", "glide").output().unwrap();
